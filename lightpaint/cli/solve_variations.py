@@ -5,21 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lightpaint import batch
 from lightpaint.basis import Basis
-from lightpaint.batch import (
-    FILES,
-    LookEntry,
-    check_gallery,
-    counts_text,
-    entry_of,
-    is_disk_full,
-    is_reserved,
-    publish_shifted,
-    shifted_folders,
-    variation_folder,
-    variation_jobs,
-    write_solve_gallery,
-)
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError
@@ -45,7 +32,7 @@ class LookSet:
     variation_names: Mapping[Path, str]
     derived_folders: Mapping[Path, Mapping[str, ResultFolder]]
     failures: dict[str, str]
-    entries: list[LookEntry] = field(default_factory=list)
+    entries: list[batch.LookEntry] = field(default_factory=list)
     shifted_looks: list[dict[str, Any]] = field(default_factory=list)
 
     def finish_look(
@@ -54,15 +41,15 @@ class LookSet:
         """Write the variations that are computed from an answer."""
         self._enter(job)
         for word, place in self.derived_folders.get(job.folder, {}).items():
-            publish_shifted(job, word, place, lighting, bases, listen)
-            self.entries.append(entry_of(job, place.folder, word))
+            batch.publish_shifted(job, word, place, lighting, bases, listen)
+            self.entries.append(batch.entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             relation = {"variation": word, "of": str(job.folder)}
             self.shifted_looks.append(files_document(place.folder, files, **relation))
 
     def continues_after(self, job: Job, error: LightpaintError) -> bool:
         """Return True if the other looks are solved in spite of an error."""
-        if not self.keep_going or is_disk_full(error):
+        if not self.keep_going or batch.is_disk_full(error):
             return False
         self._enter(job)
         self.failures[job.folder.name] = error.sentence
@@ -75,15 +62,19 @@ class LookSet:
         if self.gallery is None:
             return
         entry_names = {entry.name for entry in self.entries}
-        failed_entries = [LookEntry(name, "") for name in self.failures if name not in entry_names]
-        rows = write_solve_gallery(
+        failed_entries = [
+            batch.LookEntry(name, "") for name in self.failures if name not in entry_names
+        ]
+        rows = batch.write_solve_gallery(
             self.gallery, [*self.entries, *failed_entries], self.failures, bases
         )
-        terminal.write(f"{self.gallery / FILES[0]}: {counts_text(rows)}")
+        terminal.write(f"{self.gallery / batch.FILES[0]}: {batch.counts_text(rows)}")
 
     def _enter(self, job: Job) -> None:
         if all(entry.name != job.folder.name for entry in self.entries):
-            self.entries.append(entry_of(job, variation=self.variation_names.get(job.folder, "")))
+            self.entries.append(
+                batch.entry_of(job, variation=self.variation_names.get(job.folder, ""))
+            )
 
 
 def look_set(
@@ -106,7 +97,7 @@ def look_set(
     derived_folders: dict[Path, Mapping[str, ResultFolder]] = {}
     for job in jobs:
         try:
-            variations, places = variation_jobs(job, words), shifted_folders(job, words)
+            variations, places = batch.variation_jobs(job, words), batch.shifted_folders(job, words)
         except LOOK_ERRORS as error:
             if not keep_going:
                 raise
@@ -121,7 +112,7 @@ def look_set(
 
 def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
     """Raise OutputError where a variation would go to the folder of another painting."""
-    for folder in (variation_folder(x, word) for x in folders for word in words):
+    for folder in (batch.variation_folder(x, word) for x in folders for word in words):
         if folder in folders:
             raise OutputError(
                 f"a variation and a painting would both go to {folder}: solve them separately, "
@@ -137,12 +128,12 @@ def _gallery_folder(output: Path | None, folders: Sequence[Path], *, force: bool
     """
     place = folders[0].parent if folders else output or Path()
     try:
-        if reserved_name := next((x.name for x in folders if is_reserved(x.name)), ""):
+        if reserved_name := next((x.name for x in folders if batch.is_reserved(x.name)), ""):
             raise OutputError(
                 f"{reserved_name} is a folder of the gallery of several looks: give the "
                 "painting another name"
             )
-        check_gallery(place, force=force)
+        batch.check_gallery(place, force=force)
     except OutputError:
         if output is not None:
             raise

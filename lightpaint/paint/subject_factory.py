@@ -5,23 +5,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from lightpaint import lighting
 from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.basis.cache import folder as cache_folder
 from lightpaint.basis.cache import open_kept
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.files import file_length, scene_name
-from lightpaint.lighting import (
-    Constraints,
-    LightConstraint,
-    check_powers,
-    check_same_lights,
-    constraints_of,
-    is_pattern,
-    reduce_to,
-    with_scale,
-    with_sure_scale,
-)
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
@@ -57,7 +47,7 @@ def make_subjects(
         check_view_names([view.sensor for view in identity.views])
     bases = [subject.basis for subject in subjects if subject.basis is not None]
     for basis in bases[1:]:
-        check_same_lights(bases[0], basis)
+        lighting.check_same_lights(bases[0], basis)
     return subjects
 
 
@@ -66,7 +56,7 @@ def make_subject(
     folder: Path | None = None,
     *,
     settings: Settings | None = None,
-    constraints: Constraints | None = None,
+    constraints: lighting.Constraints | None = None,
     choice: TransformChoice | None = None,
     command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: "",
     view_count: int = 1,
@@ -81,8 +71,8 @@ def make_subject(
     lights cannot meet the constraints, and OutputError if there is no folder for its cache.
     """
     settings = settings or Settings()
-    constraints = Constraints() if constraints is None else constraints
-    constraints = constraints.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    constraints = lighting.Constraints() if constraints is None else constraints
+    constraints = constraints.and_then(lighting.Constraints(cd_per_unit=settings.cd_per_unit))
     if layers is not None:
         if view_count > 1:
             raise PaintError(f"{layers} has the layers of one view: open that view alone")
@@ -113,7 +103,10 @@ def make_subject(
 
 
 def _scene_on_film(
-    source: SceneFile | Scene, settings: Settings, constraints: Constraints, check_lamps: CheckLamps
+    source: SceneFile | Scene,
+    settings: Settings,
+    constraints: lighting.Constraints,
+    check_lamps: CheckLamps,
 ) -> Scene | LazyScene:
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
@@ -146,7 +139,7 @@ def _scene_on_film(
     return scene
 
 
-def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints) -> Scene:
+def _with_spectra(scene: Scene, *, settings: Settings, constraints: lighting.Constraints) -> Scene:
     """Return a scene with a light for each emitter if settings ask for spectra, else as it is.
 
     Raises LightpaintError if it cannot be rendered with spectra.
@@ -155,7 +148,7 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
         return scene
     from lightpaint.pipeline import check_spectral, observer_of, spectral_scene
 
-    every = constraints_of(scene.requests).and_then(constraints)
+    every = lighting.constraints_of(scene.requests).and_then(constraints)
     check_spectral(settings, every)
     return spectral_scene(scene, every, observer_of(settings.observer))
 
@@ -166,18 +159,18 @@ def _kept(source: Paintable) -> Basis | None:
 
 
 def _check_constraints(
-    lights: Lights, constraints: Constraints, settings: Settings, check_lamps: CheckLamps
+    lights: Lights, constraints: lighting.Constraints, settings: Settings, check_lamps: CheckLamps
 ) -> None:
     """Raise ConstraintError unless lights can meet these constraints and their lights file's, and
     have the power that a limit in the settings needs.
     """
-    all_constraints = constraints_of(lights.requests).and_then(constraints)
+    all_constraints = lighting.constraints_of(lights.requests).and_then(constraints)
     # Of planes it is known after a measurement which lights reach them.
-    scaled = with_sure_scale if settings.planes is None else with_scale
-    reduction = reduce_to(scaled(all_constraints, lights), lights)
+    scaled = lighting.with_sure_scale if settings.planes is None else lighting.with_scale
+    reduction = lighting.reduce_to(scaled(all_constraints, lights), lights)
     check_lamps({lights[k].name: lamp.names for k, lamp in reduction.lamps.items()})
     if settings.watts is not None:
-        check_powers(reduction, [light.name for light in lights], "a limit of power")
+        lighting.check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
 def _check_named_lamps(source: SceneFile, check_lamps: CheckLamps) -> None:
@@ -188,11 +181,11 @@ def _check_named_lamps(source: SceneFile, check_lamps: CheckLamps) -> None:
         Path(source.path), source.lights_file, beside_scene=source.use_lights_file
     )
     named = {
-        name: [x.name for x in LightConstraint.of(table, where=where).emitters]
-        for name, table, where in constraints_of(file.requests).lights
+        name: [x.name for x in lighting.LightConstraint.of(table, where=where).emitters]
+        for name, table, where in lighting.constraints_of(file.requests).lights
         if "emitters" in table
     }
-    if named and not any(is_pattern(name) for name in named):
+    if named and not any(lighting.is_pattern(name) for name in named):
         check_lamps(named)
 
 

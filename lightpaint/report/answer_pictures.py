@@ -13,18 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint import images
 from lightpaint.arrays import Doubles, Floats, Indices, largest
 from lightpaint.basis import Basis, denoise_current_look, denoise_mix, denoise_mixes, meter_exposure
 from lightpaint.colour import ViewTransform, luminance
-from lightpaint.images import (
-    DENOISED_KEY,
-    LARGE_PICTURE,
-    Features,
-    box_mean,
-    by_bands,
-    denoised,
-    denoiser_text,
-)
 from lightpaint.lighting import Solution
 from lightpaint.report.basis_memo import cached_clean_planes
 from lightpaint.target import Target
@@ -100,7 +92,7 @@ def _dim_look(current: Floats, transform: ViewTransform, *, hatched: bool) -> Fl
         lines = hatched & ((np.arange(width) + y) % period < max(1, period // 5))
         return np.asarray(0.07 + 0.28 * luminance(transform.encode(look)) + 0.08 * lines)
 
-    return np.asarray(by_bands(dim, current, np.arange(height)[:, None]))
+    return np.asarray(images.by_bands(dim, current, np.arange(height)[:, None]))
 
 
 def over_unpainted(
@@ -124,7 +116,7 @@ def over_unpainted(
         return finish(np.asarray(share * encode(band) + (1 - share) * dim[..., None]))
 
     rest = _dim_look(current, transform, hatched=hatched)
-    return np.asarray(by_bands(lay, picture, share, rest))
+    return np.asarray(images.by_bands(lay, picture, share, rest))
 
 
 def target_picture(
@@ -149,7 +141,7 @@ def target_picture(
         share = share[..., None]
         return finish(share * transform.encode(paint) + (1 - share) * transform.encode(look))
 
-    return np.asarray(by_bands(lay, target.image, share, current))
+    return np.asarray(images.by_bands(lay, target.image, share, current))
 
 
 def importance_picture(
@@ -201,7 +193,7 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
     """
     counts = (solution.importance > 0).astype(np.float64)
     goal = solution.goal(predicted)
-    exact = by_bands(lambda x, y: luminance(x.astype(np.float64) - y), predicted, goal)
+    exact = images.by_bands(lambda x, y: luminance(x.astype(np.float64) - y), predicted, goal)
     del goal
 
     def mean_over(radius: int) -> tuple[Floats, float]:
@@ -209,14 +201,14 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
             values = exact
         else:
             # Only pixels that count, so that nothing bleeds into paint from beside it.
-            share = box_mean(counts, radius)
-            values = box_mean(exact * counts, radius) / np.where(share > 0, share, 1)
+            share = images.box_mean(counts, radius)
+            values = images.box_mean(exact * counts, radius) / np.where(share > 0, share, 1)
             values = np.where(counts > 0, values, exact)
         end = float(np.percentile(np.abs(values[counts > 0]), 99))
         return values, round_up(max(end, FINEST_SCALE * 2.0**-transform.stops))
 
     half = solution.basis.predict(solution.weights).half_difference
-    noise = by_bands(lambda x: luminance(x.astype(np.float64)), half)
+    noise = images.by_bands(lambda x: luminance(x.astype(np.float64)), half)
     spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
     if spread == 0:
         return Residual(*mean_over(0), 0)
@@ -286,8 +278,10 @@ class Encoder(ViewTransform):
 
     def encode(self, image: Floats) -> Floats:
         """Return the display values of `ViewTransform.encode`, read-only."""
-        if image.size >= 3 * LARGE_PICTURE:  # which would be kept as long as the report is made
-            return np.asarray(by_bands(super().encode, image))
+        if (
+            image.size >= 3 * images.LARGE_PICTURE
+        ):  # which would be kept as long as the report is made
+            return np.asarray(images.by_bands(super().encode, image))
         if isinstance(image.base, np.ndarray) and image.base.size > image.size:
             return super().encode(image)  # a band of a large picture
         if id(image) not in self.encoded:
@@ -319,7 +313,7 @@ class CleanLooks:
         predicted: Floats,
         verified: Floats | None,
         *,
-        larger: Features | None = None,
+        larger: images.Features | None = None,
     ) -> "CleanLooks":
         """Make the looks without their grain.
 
@@ -328,9 +322,9 @@ class CleanLooks:
         """
         features = basis.features
         if verified is not None:
-            verified = denoised(verified, larger or features)
+            verified = images.denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
-        texts = denoiser_text(features, raw=raw)
+        texts = images.denoiser_text(features, raw=raw)
         planes = cached_clean_planes(basis)
         if planes is None and basis.former is None:
             looks = [basis.current_look, predicted]
@@ -364,4 +358,4 @@ class CleanLooks:
     @property
     def denoiser(self) -> str:
         """Name of the denoiser, for people."""
-        return self.texts.get(DENOISED_KEY, "").partition(";")[0]
+        return self.texts.get(images.DENOISED_KEY, "").partition(";")[0]

@@ -4,19 +4,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from lightpaint import photometry
 from lightpaint.lighting import PlanesAnswer, WishOutcome
-from lightpaint.photometry import (
-    LARGEST_ANGLE,
-    LEAST_ANGLE,
-    LEAST_RATING,
-    NORMAL_95,
-    PRESETS,
-    GlareReading,
-    MeasuringPlane,
-    PlaneReading,
-    glare_document,
-    plane_title,
-)
 
 #: Headings of a table of observers.
 GLARE_HEADINGS = ("observer", "UGR", "background cd/m²", "most from")
@@ -34,31 +23,31 @@ LEAST_PRICE = 0.05
 LEAST_COST = 0.05
 
 
-def glare_rows(readings: Mapping[str, GlareReading]) -> Iterator[tuple[str, ...]]:
+def glare_rows(readings: Mapping[str, photometry.GlareReading]) -> Iterator[tuple[str, ...]]:
     """Yield a row for each observer, in the order of `GLARE_HEADINGS`. readings: by title."""
     for title, reading in readings.items():
         yield title, rating_text(reading), f"{reading.background:.3g}", reading.strongest
 
 
-def rating_text(reading: GlareReading) -> str:
+def rating_text(reading: photometry.GlareReading) -> str:
     """Return the UGR with half of its 95 % interval."""
     if reading.rating is None:
         return "unknown"
-    if reading.rating < LEAST_RATING:
-        return f"< {LEAST_RATING:g}"
+    if reading.rating < photometry.LEAST_RATING:
+        return f"< {photometry.LEAST_RATING:g}"
     return f"{reading.rating:.1f} ± {max(reading.interval, 0.1):.1f}"
 
 
-def glare_sentences(readings: Mapping[str, GlareReading]) -> Iterator[str]:
+def glare_sentences(readings: Mapping[str, photometry.GlareReading]) -> Iterator[str]:
     """Yield what readers of the table have to know. readings: by title."""
     for title, reading in readings.items():
         if reading.rating is None:
             yield f"The UGR of {title} cannot be told: {reading.reason}."
-        elif reading.rating >= LEAST_RATING and reading.is_of_unusual_size:
+        elif reading.rating >= photometry.LEAST_RATING and reading.is_of_unusual_size:
             yield (
                 f"The UGR of {title} comes from {reading.strongest}, which fills "
-                f"{reading.solid_angle:.2g} sr: it is made for {LEAST_ANGLE:g} to "
-                f"{LARGEST_ANGLE:g} sr."
+                f"{reading.solid_angle:.2g} sr: it is made for {photometry.LEAST_ANGLE:g} to "
+                f"{photometry.LARGEST_ANGLE:g} sr."
             )
 
 
@@ -67,9 +56,9 @@ def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
     planes = {plane.name: plane for plane in answer.wished.illuminance.planes}
     for (case, name), reading in answer.readings.items():
         yield (
-            plane_title(name, case),
-            f"{reading.mean:.0f} ± {NORMAL_95 * reading.mean_error:.1g}",
-            f"{reading.uniformity:.2f} ± {NORMAL_95 * reading.uniformity_error:.1g}",
+            photometry.plane_title(name, case),
+            f"{reading.mean:.0f} ± {photometry.NORMAL_95 * reading.mean_error:.1g}",
+            f"{reading.uniformity:.2f} ± {photometry.NORMAL_95 * reading.uniformity_error:.1g}",
             f"{reading.least:.0f}",
             f"{reading.most:.0f}",
             wishes_text(planes[name]),
@@ -77,7 +66,7 @@ def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
         )
 
 
-def wishes_text(plane: MeasuringPlane) -> str:
+def wishes_text(plane: photometry.MeasuringPlane) -> str:
     """Return what is wished for on a plane in few words; "" for nothing."""
     wishes = plane.wishes
     parts = [] if wishes.mean is None else [f"{wishes.mean:g} lx"]
@@ -87,9 +76,11 @@ def wishes_text(plane: MeasuringPlane) -> str:
     return ", ".join(parts)
 
 
-def glare_by_title(answer: PlanesAnswer) -> dict[str, GlareReading]:
+def glare_by_title(answer: PlanesAnswer) -> dict[str, photometry.GlareReading]:
     """Return the glare that observers see, by name of the observer and case."""
-    return {plane_title(name, case): x for (case, name), x in answer.glare_readings.items()}
+    return {
+        photometry.plane_title(name, case): x for (case, name), x in answer.glare_readings.items()
+    }
 
 
 def planes_sentences(answer: PlanesAnswer) -> list[str]:
@@ -121,7 +112,7 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
     """Return the planes as numbers of report.json."""
     planes = {}
     for (case, name), reading in answer.readings.items():
-        planes[plane_title(name, case)] = {
+        planes[photometry.plane_title(name, case)] = {
             "mean_lx": reading.mean,
             "mean_error_lx": reading.mean_error,
             "uniformity": reading.uniformity,
@@ -138,7 +129,9 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
     budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
     return {
         "planes": planes,
-        "observers": {name: glare_document(x) for name, x in glare_by_title(answer).items()},
+        "observers": {
+            name: photometry.glare_document(x) for name, x in glare_by_title(answer).items()
+        },
         "watts": answer.watts,
         "budget_watts": min(budget, default=None),
         "floor_m2": answer.floor_m2 or None,
@@ -151,7 +144,7 @@ def _preset_sentences(answer: PlanesAnswer) -> Iterator[str]:
     """Yield where the figures of presets come from."""
     presets = {plane.wishes.preset for plane in answer.wished.illuminance.planes} - {""}
     for name in sorted(presets):
-        yield f"{name}: {PRESETS[name]}."
+        yield f"{name}: {photometry.PRESETS[name]}."
 
 
 def _outcome_numbers(outcome: WishOutcome) -> dict[str, Any]:
@@ -166,7 +159,7 @@ def _outcome_numbers(outcome: WishOutcome) -> dict[str, Any]:
     }
 
 
-def _density(answer: PlanesAnswer, reading: PlaneReading) -> str:
+def _density(answer: PlanesAnswer, reading: photometry.PlaneReading) -> str:
     """Return the power per m² and 100 lx; "" where something of that is unknown."""
     if answer.watts is None or not answer.floor_m2 or not reading.mean:
         return ""
@@ -175,7 +168,7 @@ def _density(answer: PlanesAnswer, reading: PlaneReading) -> str:
 
 def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     wish, reached = outcome.wish, outcome.reached
-    title = plane_title(wish.plane, wish.case)
+    title = photometry.plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
         if answer.are_ignored:
@@ -216,5 +209,5 @@ def _prices(answer: PlanesAnswer) -> Iterator[str]:
             continue
         step, text = STEPS[outcome.wish.kind]
         if (watts := step * outcome.price) >= LEAST_PRICE:
-            title = plane_title(outcome.wish.plane, outcome.wish.case)
+            title = photometry.plane_title(outcome.wish.plane, outcome.wish.case)
             yield f"The {text} {title} cost {watts:.2g} W."

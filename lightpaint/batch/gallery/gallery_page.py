@@ -21,6 +21,7 @@ import numpy as np
 from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
+from lightpaint import report
 from lightpaint.basis import Basis, LightGroups, light_images
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
@@ -45,17 +46,6 @@ from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import read_lighting
 from lightpaint.pipeline import BasisFile, GroupsFile, Job, SceneFile, content, hung_of
 from lightpaint.placement import PlacementRecord
-from lightpaint.report import (
-    LightChange,
-    html,
-    kelvin_colors,
-    light_data,
-    lighting_data,
-    packed_gels,
-    planes_for_page,
-    shorten_to_width,
-    transform_data,
-)
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 from lightpaint.viewer import bundled, styles
@@ -88,7 +78,7 @@ class GroupPlaces:
     """The moved lights of a group of looks, for the page. picture: data: URI; "" without one."""
 
     sentence: str
-    changes: Sequence[LightChange]
+    changes: Sequence[report.LightChange]
     picture: str
 
 
@@ -150,7 +140,7 @@ def gallery_page(
         if (bases or {}).get(row.folder) in mixers:
             record["basis"] = (bases or {})[row.folder]
         records.append(record)
-    page = html(
+    page = report.html(
         "batch/gallery/gallery",
         title=visible(title),
         about=counts_text(rows),
@@ -212,7 +202,7 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
     title = counts_text(rows)
     if len(rows) > MAX_PICTURES:
         title += f"; the first {MAX_PICTURES} are shown"
-    draw.text((GAP, GAP), shorten_to_width(title, font, size[0] - 2 * GAP), FAINT, font)
+    draw.text((GAP, GAP), report.shorten_to_width(title, font, size[0] - 2 * GAP), FAINT, font)
     for k, row in enumerate(rows_with_pictures):
         x = GAP + k % columns * (WIDTH + GAP)
         y = 2 * GAP + CAPTION_HEIGHT + k // columns * (height + CAPTION_HEIGHT + GAP)
@@ -242,7 +232,9 @@ def _draw(
     draw.text((x + width, baseline), text, FAINT, font, anchor="rs")
     room = width - round(font.getlength(text)) - 8
     name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
-    draw.text((x, baseline), shorten_to_width(visible(name), font, room), TEXT, font, anchor="ls")
+    draw.text(
+        (x, baseline), report.shorten_to_width(visible(name), font, room), TEXT, font, anchor="ls"
+    )
 
 
 def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:
@@ -331,11 +323,11 @@ def _mixer(
         "joint": [
             {**image, "levels": {"answer": 1.0, "present": 1.0}} for image in record["images"]
         ],
-        "kelvins": kelvin_colors(),
-        "gels": packed_gels(),
-        "transform": transform_data(ViewTransform()),
+        "kelvins": report.kelvin_colors(),
+        "gels": report.packed_gels(),
+        "transform": report.transform_data(ViewTransform()),
         "painting": None,
-        "lighting": lighting_data(lighting),
+        "lighting": report.lighting_data(lighting),
         "command": None,
     }
     section = (
@@ -364,10 +356,10 @@ def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> 
 
 def transforms_of(rows: Sequence[SummaryRow]) -> dict[str, Any]:
     """Return the looks' view transforms by name; the exposure belongs to each look."""
-    transforms = {"srgb": transform_data(ViewTransform())}
+    transforms = {"srgb": report.transform_data(ViewTransform())}
     for name in dict.fromkeys(row.view[0] for row in rows if row.view):
         with suppress(LightpaintError):
-            transforms.setdefault(name, transform_data(ViewTransform(name)))
+            transforms.setdefault(name, report.transform_data(ViewTransform(name)))
     return transforms
 
 
@@ -394,7 +386,7 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
     if read_planes(path).get("identity") == identity:
         return
     is_noisy = any(x.any() for x in basis.noise)
-    size, planes = planes_for_page(basis, is_clean=is_noisy)
+    size, planes = report.planes_for_page(basis, is_clean=is_noisy)
     record = {
         "identity": identity,
         "scene": Path(basis.origin.scene).name,
@@ -402,7 +394,7 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
         "size": size,
         "totals": [float(sum(total)) for total in basis.totals],
         "lights": [
-            {**light_data(x), "present": list(map(float, x.emission))} for x in basis.lights
+            {**report.light_data(x), "present": list(map(float, x.emission))} for x in basis.lights
         ],
         "images": [
             {

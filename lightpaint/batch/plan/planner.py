@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from lightpaint import pipeline
 from lightpaint.basis import Basis, BasisLight, LightGroups
 from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pass
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
@@ -46,15 +47,6 @@ from lightpaint.lighting import (
 )
 from lightpaint.photometry.measure import DEFAULT_ERROR, FIRST_SPP, MOST_SPP
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
-from lightpaint.pipeline import (
-    Job,
-    Settings,
-    check_nothing_unused,
-    check_planes,
-    content,
-    is_as_written,
-    view_names,
-)
 from lightpaint.relit import scene_of
 from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
@@ -220,7 +212,7 @@ class _Planner:
         if "export" in entry.want:
             tasks.append(export_task(answer, entry, folder))
             fingerprints.append(self._fingerprints.export(entry))
-        is_whole = is_possible and is_as_written(folder)
+        is_whole = is_possible and pipeline.is_as_written(folder)
         steps = []
         for task, fingerprint in zip(tasks, fingerprints, strict=True):
             line = self.journal.lines.get((task.look, task.kind))
@@ -228,7 +220,7 @@ class _Planner:
             # A new answer invalidates its render and exports.
             is_whole = is_whole and is_done
             if task.kind == "export":
-                is_whole = is_whole and is_as_written(folder / EXPORT)
+                is_whole = is_whole and pipeline.is_as_written(folder / EXPORT)
             steps.append(PlanStep(task, fingerprint, is_whole))
         return tuple(steps)
 
@@ -269,7 +261,7 @@ class _Planner:
         return entry, source_files, (*job.remarks, *_remarks_on_suns(job))
 
     def _check_planes(
-        self, name: str, scene: Scene, constraints: Constraints, settings: Settings
+        self, name: str, scene: Scene, constraints: Constraints, settings: pipeline.Settings
     ) -> None:
         """Check the planes that settings of a look name, if any, and note what their lux cost; each
         file is read once for a scene.
@@ -282,7 +274,7 @@ class _Planner:
             return self._planes[key]
 
         if settings.planes is not None:
-            check_planes(scene, settings.planes, constraints, settings, read=read)
+            pipeline.check_planes(scene, settings.planes, constraints, settings, read=read)
             self.measurements[name] = _cost_of_lux(scene, read(settings.planes, scene), settings)
 
     def _job(
@@ -290,14 +282,16 @@ class _Planner:
         entry: LookEntry,
         scenes: Sequence[Any],
         basis: Any,
-        settings: Settings,
+        settings: pipeline.Settings,
         constraints: Constraints,
-    ) -> Job:
+    ) -> pipeline.Job:
         """Return the job of a look, which reads, checks and releases the look's painting."""
         paintings = tuple(painting.without_content() for painting in entry.paintings)
         settings = replace(settings, force=self._force, command=self._command)
         folder = self._folders[entry.name]
-        return Job(tuple(scenes), paintings, folder, basis, constraints, settings, entry.by_sensor)
+        return pipeline.Job(
+            tuple(scenes), paintings, folder, basis, constraints, settings, entry.by_sensor
+        )
 
     def _check_lighting_look(self, entry: LookEntry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         """Check a look with a given or combined lighting; return its input files and remarks."""
@@ -314,7 +308,7 @@ class _Planner:
             raise BatchError("settings.planes needs the scene: give scene = ...")
         folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
-        views = view_names(scenes) if entry.by_sensor else [""]
+        views = pipeline.view_names(scenes) if entry.by_sensor else [""]
         options: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
         options["planes"] = entry.settings.planes
         derived_folder(self._folders[entry.name], scene, lightings, **options).check()
@@ -328,7 +322,7 @@ class _Planner:
         return source_files, ()
 
     def _note_costs(
-        self, entry: LookEntry, films: Sequence[Scene | None], settings: Settings
+        self, entry: LookEntry, films: Sequence[Scene | None], settings: pipeline.Settings
     ) -> None:
         """Store the cost of each basis that has to be obtained. films: one for each basis."""
         if entry.basis is not None:
@@ -346,7 +340,7 @@ class _Planner:
             )
 
 
-def _cost_of_lux(scene: Scene, planes: PlanesFile, settings: Settings) -> Cost:
+def _cost_of_lux(scene: Scene, planes: PlanesFile, settings: pipeline.Settings) -> Cost:
     """Return the cost of the illuminance of each light at all points."""
     points = sum(len(plane) for plane in planes.planes)
     error = settings.error or planes.error
@@ -373,10 +367,10 @@ def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) ->
 
     lights: Sequence[BasisLight] | None = None
     for scene in map(cache.scene, entry.scenes):
-        loaded_scene = attempt(partial(content, scene))
+        loaded_scene = attempt(partial(pipeline.content, scene))
         if loaded_scene is None:  # the lights can be checked without a sensor
             without_sensor = cache.scene(replace(scene, sensor=None))
-            loaded_scene = attempt(partial(content, without_sensor))
+            loaded_scene = attempt(partial(pipeline.content, without_sensor))
         if loaded_scene is None:
             continue
         lights = basis_lights(loaded_scene)
@@ -385,7 +379,7 @@ def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) ->
             attempt(partial(on_film, loaded_scene, None, entry.final.resolution))
     if entry.basis is not None:
         source = cache.source(entry.basis.without_content())
-        loaded_scene = attempt(partial(content, source))
+        loaded_scene = attempt(partial(pipeline.content, source))
         if loaded_scene is not None:
             lights = (
                 loaded_scene.basis.lights
@@ -393,7 +387,7 @@ def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) ->
                 else loaded_scene.lights
             )
         if not entry.scenes:
-            attempt(partial(check_nothing_unused, entry.settings, entry.basis))
+            attempt(partial(pipeline.check_nothing_unused, entry.settings, entry.basis))
     if lights is not None:
         for part in _split_constraints(entry.constraints):
             attempt(partial(reduce_to, part, lights))
@@ -410,7 +404,7 @@ def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
     yield replace(constraints, lights=(), ties=(), start={})
 
 
-def _check_by_sums(job: Job) -> None:
+def _check_by_sums(job: pipeline.Job) -> None:
     """Raise BatchError if the lighting of a job does not follow from sums alone."""
     [view] = job.views
     reason = reason_against_sums(view.target, job.fit)
@@ -464,7 +458,7 @@ def _check_given_lighting(
             raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
 
 
-def _remarks_on_suns(job: Job) -> tuple[str, ...]:
+def _remarks_on_suns(job: pipeline.Job) -> tuple[str, ...]:
     """Return a remark on a sun that a lights file asks for, and that a batch does not find."""
     scene = next((view.scene for view in job.views if view.scene is not None), None)
     if scene is None or not (suns := {k: n for k, n in scene.requests.sun.items() if n}):

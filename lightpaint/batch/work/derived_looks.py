@@ -5,24 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint import pipeline
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting import Constraints, Lighting, combine
-from lightpaint.pipeline import (
-    LIGHTING,
-    Job,
-    MeasuredPlanes,
-    ResultFolder,
-    Settings,
-    answer_files,
-    constraints_and_scale,
-    files_of_planes,
-    measure_planes,
-    new_answer,
-    with_glare,
-    write_planes,
-    write_predicted,
-)
 from lightpaint.progress import Listener
 from lightpaint.relit import scene_of
 from lightpaint.scene import Scene
@@ -37,13 +23,13 @@ def derived_folder(
     groups: LightGroups | None = None,
     planes: str | None = None,
     force: bool = False,
-) -> ResultFolder:
+) -> pipeline.ResultFolder:
     """Return the result folder of a derived answer. views: folders in it, one for each picture.
 
     planes: path of a planes file, if illuminance is measured.
     """
     input_files = tuple(map(Path, lightings))
-    files = answer_files(folder, scene=scene, groups=groups)
+    files = pipeline.answer_files(folder, scene=scene, groups=groups)
     files += [folder / view / "predicted.exr" for view in views]
     if scene is not None:
         input_files += scene.read_files
@@ -51,13 +37,13 @@ def derived_folder(
         input_files += tuple(groups.files)
     if planes is not None:
         input_files += (Path(planes),)
-        files += files_of_planes(folder, planes)
+        files += pipeline.files_of_planes(folder, planes)
     answers = tuple(map(Path, lightings))
-    return ResultFolder(folder, tuple(files), input_files, answers, force=force)
+    return pipeline.ResultFolder(folder, tuple(files), input_files, answers, force=force)
 
 
 def publish_derived(
-    results: ResultFolder,
+    results: pipeline.ResultFolder,
     lighting: Lighting,
     bases: Sequence[Basis],
     *,
@@ -65,7 +51,7 @@ def publish_derived(
     scene: Scene | None = None,
     groups: LightGroups | None = None,
     spp: int | None = None,
-    planes: MeasuredPlanes | None = None,
+    planes: pipeline.MeasuredPlanes | None = None,
 ) -> None:
     """Write lighting.json, its pictures from `bases`, and the relit scene.
 
@@ -73,36 +59,36 @@ def publish_derived(
     also written for their programs. spp: of a verification. planes: as measured.
     """
     results.check()
-    with new_answer(results, lighting, scene=scene, groups=groups) as answer:
+    with pipeline.new_answer(results, lighting, scene=scene, groups=groups) as answer:
         for basis, view in zip(bases, views, strict=True):
             (answer.path / view).mkdir(exist_ok=True)
             predicted, origin = combine(basis, lighting), basis.origin
             path, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
-            write_predicted(path, predicted, origin=origin, spp=spp_, scene=answer.relit)
+            pipeline.write_predicted(path, predicted, origin=origin, spp=spp_, scene=answer.relit)
         if planes is not None and scene is not None:
             weights = lighting.weights_for(planes.illuminance.lights)
-            words = f"{scene.path.name} lit by {LIGHTING}"
+            words = f"{scene.path.name} lit by {pipeline.LIGHTING}"
             lit = planes.weights_by_case(weights)
-            write_planes(answer.path, planes.illuminance, lit, words, glare=planes.glare)
+            pipeline.write_planes(answer.path, planes.illuminance, lit, words, glare=planes.glare)
 
 
 def measure_derived(
     scene: Scene | None,
     lighting: Lighting,
     constraints: Constraints,
-    settings: Settings,
+    settings: pipeline.Settings,
     listen: Listener,
-) -> MeasuredPlanes | None:
+) -> pipeline.MeasuredPlanes | None:
     """Return the planes that settings name, measured; None without any.
 
     The lights are where the lighting has them.
     """
     if settings.planes is None or scene is None:
         return None
-    _, scale = constraints_and_scale(scene, constraints, settings)
+    _, scale = pipeline.constraints_and_scale(scene, constraints, settings)
     placed = scene_of(scene, lighting)
-    planes = measure_planes(placed, settings.planes, settings, scale, listen)
-    return with_glare(planes, placed, settings, listen)
+    planes = pipeline.measure_planes(placed, settings.planes, settings, scale, listen)
+    return pipeline.with_glare(planes, placed, settings, listen)
 
 
 def dimmer_lights(basis: Basis) -> set[str]:
@@ -115,14 +101,14 @@ def variation_folder(folder: Path, word: str) -> Path:
     return folder.with_name(f"{folder.name}-{word.replace(' ', '-')}")
 
 
-def adjusted_light_count(job: Job) -> int:
+def adjusted_light_count(job: pipeline.Job) -> int:
     """Return the number of adjusted lights."""
     first = job.views[0]
     source = first.basis if first.basis is not None else first.scene
     return sum(not light.is_fixed for light in source.lights) if source is not None else 0
 
 
-def variation_jobs(job: Job, words: Sequence[str]) -> dict[str, Job]:
+def variation_jobs(job: pipeline.Job, words: Sequence[str]) -> dict[str, pipeline.Job]:
     """Return the jobs of variations that are solved, by their words."""
     jobs = {}
     for word in (x for x in words if x in SOLVED_WORDS):
@@ -130,11 +116,11 @@ def variation_jobs(job: Job, words: Sequence[str]) -> dict[str, Job]:
         settings, constraints = vary(word, options, job.constraints, lights)
         folder = variation_folder(job.folder, word)
         fields = (job.scenes, job.targets, folder, job.basis, constraints, settings, job.by_sensor)
-        jobs[word] = Job(*fields, rigging=job.rigging, sequence=job.sequence)
+        jobs[word] = pipeline.Job(*fields, rigging=job.rigging, sequence=job.sequence)
     return jobs
 
 
-def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
+def shifted_folders(job: pipeline.Job, words: Sequence[str]) -> dict[str, pipeline.ResultFolder]:
     """Return the result folders of variations that are derived from the answer, by their words."""
     return {
         word: derived_folder(
@@ -152,9 +138,9 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
 
 
 def publish_shifted(
-    job: Job,
+    job: pipeline.Job,
     word: str,
-    results: ResultFolder,
+    results: pipeline.ResultFolder,
     lighting: Lighting,
     bases: Sequence[Basis],
     listen: Listener,
@@ -173,6 +159,6 @@ def publish_shifted(
     publish_derived(results, shifted_lighting, bases, views=_views(job), **options)
 
 
-def _views(job: Job) -> list[str]:
+def _views(job: pipeline.Job) -> list[str]:
     """Return each view's folder, relative to the folder of the results."""
     return [str(view.folder.relative_to(job.folder)) for view in job.views]

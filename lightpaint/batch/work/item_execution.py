@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from lightpaint import pipeline
 from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.basis.render import basis_of_sums, train_guide
 from lightpaint.batch.manifest.keys import Space, as_key, shift
@@ -42,21 +43,6 @@ from lightpaint.lighting import (
     solve_squares,
     sum_rows,
     summed_problem,
-)
-from lightpaint.pipeline import (
-    BasisFile,
-    GroupsFile,
-    Job,
-    ResultFolder,
-    Settings,
-    content,
-    decode_job,
-    find_places,
-    new_answer,
-    relight_look,
-    relit_folder,
-    run,
-    view_names,
 )
 from lightpaint.placement import record_of
 from lightpaint.progress import Listener
@@ -133,9 +119,9 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
     """Return the fields of the task's job, with scenes and basis shared."""
-    fields = decode_job(task.job)
+    fields = pipeline.decode_job(task.job)
     fields["scenes"] = tuple(map(cache.scene, fields["scenes"]))
-    if isinstance(fields["basis"], BasisFile | GroupsFile):
+    if isinstance(fields["basis"], pipeline.BasisFile | pipeline.GroupsFile):
         fields["basis"] = cache.source(fields["basis"])
     return fields
 
@@ -148,23 +134,23 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     if task.lightings:
         _derive_answer(task, fields, cache, listen)
         return
-    job = Job(**fields)
+    job = pipeline.Job(**fields)
     bases = None
     if job.basis is None:
         bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     if task.is_by_sums:
         _answer_by_sums(job, job.views[0].basis or (bases or [])[0])
         return
-    run(job, listen, bases=bases)
+    pipeline.run(job, listen, bases=bases)
 
 
 def _derive_answer(
     task: Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
 ) -> None:
     """Write an answer derived from others: a lighting unchanged, warmer, or between two."""
-    settings: Settings = fields["settings"]
+    settings: pipeline.Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
-    source = content(fields["basis"])
+    source = pipeline.content(fields["basis"])
     groups = source if isinstance(source, LightGroups) else None
     bases: list[Basis] = [source if groups is None else groups.basis]
     if source is None:
@@ -174,7 +160,7 @@ def _derive_answer(
         lighting = shift(lighting, task.mireds, dimmer_lights(bases[0]))
     scale = settings.cd_per_unit or lighting.cd_per_unit
     lighting = replace(lighting.for_target(task.look), cd_per_unit=scale)
-    views = view_names(scenes) if fields["by_sensor"] else [""]
+    views = pipeline.view_names(scenes) if fields["by_sensor"] else [""]
     scene = scenes[0] if scenes else None
     options: dict[str, Any] = {"views": views, "groups": groups}
     results = derived_folder(
@@ -212,12 +198,12 @@ def final_render(
     fields = job_fields(task, cache)
     [lighting] = map(Path, task.lightings)
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
-    views = view_names(scenes) if fields["by_sensor"] else [""]
+    views = pipeline.view_names(scenes) if fields["by_sensor"] else [""]
     force = fields["settings"].force
-    results = relit_folder(scenes[0], lighting, fields["folder"], views=views, force=force)
+    results = pipeline.relit_folder(scenes[0], lighting, fields["folder"], views=views, force=force)
     options: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
     options["resolution"] = task.final.resolution
-    relight_look(
+    pipeline.relight_look(
         dict(zip(views, scenes, strict=True)),
         read_lighting(lighting),
         results,
@@ -234,7 +220,7 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
     basis_source = fields["basis"]
     source = Source(
         fields["scenes"][0].content if fields["scenes"] else None,
-        basis_source.content if isinstance(basis_source, GroupsFile) else None,
+        basis_source.content if isinstance(basis_source, pipeline.GroupsFile) else None,
         Path(task.handover.stage) if task.handover.stage else None,
     )
     names = names_of_forms(task.handover.to, source)
@@ -242,7 +228,7 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
     writers, remark = writers_of(names, answer, source, folder, listen)
     files, input_files = tuple(folder / name for name in writers), (lighting, *source.files)
     force = fields["settings"].force
-    results = ResultFolder(folder, files, input_files, (lighting,), force=force)
+    results = pipeline.ResultFolder(folder, files, input_files, (lighting,), force=force)
     results.check()
     if remark:
         listen.say(remark)
@@ -268,7 +254,7 @@ def _sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     ]
 
 
-def _answer_by_sums(job: Job, basis: Basis) -> None:
+def _answer_by_sums(job: pipeline.Job, basis: Basis) -> None:
     """Solve with the sums of a basis in memory, and write the lighting."""
     [view] = job.views
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
@@ -285,7 +271,7 @@ def _answer_by_sums(job: Job, basis: Basis) -> None:
 
 
 def publish_solved_lights(
-    job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
+    job: pipeline.Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
 ) -> None:
     """Solve, and write the lighting. The other parameters are as in `summed_problem`."""
     problem = summed_problem(
@@ -300,10 +286,10 @@ def publish_solved_lights(
     _publish_lighting_only(job, solve_squares(problem, problem.start).lighting)
 
 
-def _publish_lighting_only(job: Job, lighting: Lighting) -> None:
+def _publish_lighting_only(job: pipeline.Job, lighting: Lighting) -> None:
     """Write the lighting and the relit scene."""
     [view] = job.views
-    with new_answer(job.results, lighting, scene=view.scene):
+    with pipeline.new_answer(job.results, lighting, scene=view.scene):
         pass  # there are no pictures
 
 
@@ -348,8 +334,8 @@ def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listene
     for key, file in zip(item.bases, item.files, strict=True):
         cache.load(key, file)
     bases = [basis for key in item.bases if (basis := cache.basis(key)) is not None]
-    jobs = [Job(**_unplaced_fields(task, cache)) for task in item.tasks]
-    placement = find_places(jobs, bases, listen)
+    jobs = [pipeline.Job(**_unplaced_fields(task, cache)) for task in item.tasks]
+    placement = pipeline.find_places(jobs, bases, listen)
     looks: Sequence[str] = [task.look for task in item.tasks]
     looks = looks if len(looks) > 1 else ()
     return record_of(placement, looks=looks, made_of=item.fingerprint).to_json()
@@ -357,5 +343,5 @@ def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listene
 
 def _unplaced_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
     """Return the fields of a look's job, whose lights are where the scene has them."""
-    fields = decode_job(task.job)
+    fields = pipeline.decode_job(task.job)
     return fields | {"scenes": tuple(map(cache.scene, fields["scenes"])), "placement": None}

@@ -9,22 +9,13 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
+from lightpaint import pipeline
 from lightpaint.basis.render import Part
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, Final, Handover, Space
 from lightpaint.colour import Observer
 from lightpaint.errors import BatchError
 from lightpaint.lighting import Emitters
-from lightpaint.pipeline import (
-    BasisFile,
-    GroupsFile,
-    Painting,
-    PlacementFile,
-    SceneFile,
-    Settings,
-    encode_job,
-    vars_of,
-)
 from lightpaint.scene.quality_presets import Quality
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -109,7 +100,7 @@ class SceneFilm:
     the places of lights that moved or are new; "" if none did.
     """
 
-    scene: SceneFile
+    scene: pipeline.SceneFile
     quality: Quality | None = None
     resolution: str | None = None
     files: tuple[str, ...] = ()
@@ -132,7 +123,7 @@ class SceneFilm:
     @property
     def key(self) -> str:
         """Key that equal films share."""
-        film = [vars_of(self.scene), self.quality, self.resolution, self.light_names]
+        film = [pipeline.vars_of(self.scene), self.quality, self.resolution, self.light_names]
         return json.dumps([*film, *([self.places] if self.places else [])])
 
 
@@ -191,7 +182,7 @@ class PartOfBasis:
 class PaintingOfSums:
     """A painting to form sums with. emitters: of `Fit`; resize: of `Settings`."""
 
-    painting: Painting
+    painting: pipeline.Painting
     emitters: Emitters
     resize: bool
 
@@ -253,7 +244,7 @@ class Passes:
     """
 
     name: str
-    relit: SceneFile
+    relit: pipeline.SceneFile
     final: Final
     first: int
     last: int
@@ -275,7 +266,7 @@ class Passes:
         return replace(self, relit=scene_with_paths(self.relit, move), files=files)
 
 
-def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
+def scene_with_paths(scene: pipeline.SceneFile, move: PathMap) -> pipeline.SceneFile:
     """Return the same scene with other paths."""
 
     def moved(path: str | None) -> str | None:
@@ -398,7 +389,7 @@ def answer_task(
     return Task(
         entry.name,
         "answer",
-        encode_job(
+        pipeline.encode_job(
             entry.scenes,
             entry.paintings,
             entry.basis,
@@ -406,7 +397,7 @@ def answer_task(
             replace(entry.settings, force=force, command=command),
             folder=str(folders[entry.name]),
             by_sensor=entry.by_sensor,
-            placement=PlacementFile(entry.places) if entry.places else None,
+            placement=pipeline.PlacementFile(entry.places) if entry.places else None,
         ),
         tuple([entry.lighting] if entry.lighting else lightings),
         tuple(map(str, source_files)),
@@ -434,7 +425,7 @@ def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
     """Return the task of a look's exports. answer: the task of its answer, in `folder`."""
     lighting = str(folder / "lighting.json")
     # An export to light groups needs their names.
-    bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
+    bases = answer.bases if isinstance(entry.basis, pipeline.GroupsFile) else ()
     options: dict[str, Any] = {"handover": entry.handover, "bases": bases}
     return Task(entry.name, "export", answer.job, (lighting,), answer.source_files, **options)
 
@@ -446,12 +437,12 @@ def bases_of(entry: LookEntry) -> tuple[str, ...]:
     return tuple(key_of_scene(scene, entry.settings, entry.places) for scene in entry.scenes)
 
 
-def key_of_basis(basis: BasisFile | GroupsFile) -> str:
+def key_of_basis(basis: pipeline.BasisFile | pipeline.GroupsFile) -> str:
     """Return the key of a saved basis, or of light groups."""
     return json.dumps({"basis": asdict(basis)})
 
 
-def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
+def key_of_scene(scene: pipeline.SceneFile, settings: pipeline.Settings, places: str = "") -> str:
     """Return the key of a rendered basis: the scene with its sensor, and the render settings.
 
     places: file of the places of lights that may move; "" for the basis of the unchanged scene.
@@ -460,7 +451,7 @@ def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
     return json.dumps(key | ({"places": places} if places else {}))
 
 
-def render_settings(settings: Settings) -> dict[str, Any]:
+def render_settings(settings: pipeline.Settings) -> dict[str, Any]:
     """Return the settings that a rendered basis depends on, by name."""
     names = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
     return {name: getattr(settings, name) for name in names}

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from lightpaint import report
 from lightpaint.basis import BasisLight, LightImage, joined_texels, light_images
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
@@ -17,34 +18,6 @@ from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting import KEYS_BY_KIND, LightSetting, PlanesAnswer, Reason, renderings_of
 from lightpaint.photometry import GlareReading
 from lightpaint.pipeline import Look, Settings
-from lightpaint.report import (
-    ANY_COLOR,
-    GLARE_HEADINGS,
-    HEADINGS,
-    bound_sentences,
-    closer_choice,
-    compensation_sentences,
-    energy_shares,
-    error_sentences,
-    fit_sentence,
-    glare_by_title,
-    glare_rows,
-    partly_reached,
-    plane_rows,
-    planes_sentences,
-    rendering_sentences,
-    spoken_about,
-    spoken_cause,
-    spoken_errors,
-    spoken_lamp,
-    spoken_percent,
-    spoken_preference,
-    spoken_view,
-    spoken_wheels,
-    uncertainty_sentence,
-    unreached_channels,
-    untold_lights,
-)
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]
@@ -69,13 +42,13 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
         _show_all(look)
     else:
         _show_short(look)
-    if wheels := spoken_wheels(look.lighting.lights):
+    if wheels := report.spoken_wheels(look.lighting.lights):
         terminal.tell(wheels)
     terminal.write("")
     if look.planes is not None:
         show_planes(look.planes)
     _show_renderings(look)
-    terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
+    terminal.tell(report.fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
         counts_text = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
@@ -95,12 +68,12 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
 def show_planes(answer: PlanesAnswer) -> None:
     """Print what an answer gives on measuring planes."""
     if answer.readings:
-        table = terminal.table(*HEADINGS)
-        for row in plane_rows(answer):
+        table = terminal.table(*report.HEADINGS)
+        for row in report.plane_rows(answer):
             table.row(*row)
         terminal.print_table(table)
-    show_glare(glare_by_title(answer))
-    for sentence in planes_sentences(answer):
+    show_glare(report.glare_by_title(answer))
+    for sentence in report.planes_sentences(answer):
         terminal.tell(sentence)
     terminal.write("")
 
@@ -109,8 +82,8 @@ def show_glare(readings: Mapping[str, GlareReading]) -> None:
     """Print the glare that observers see. readings: by title."""
     if readings:
         terminal.write("")
-        table = terminal.table(*GLARE_HEADINGS)
-        for row in glare_rows(readings):
+        table = terminal.table(*report.GLARE_HEADINGS)
+        for row in report.glare_rows(readings):
             table.row(*row)
         terminal.print_table(table)
 
@@ -120,7 +93,7 @@ def _show_renderings(look: Look) -> None:
     lamps = [x.lamp for x in look.lighting.lights if x.lamp is not None]
     if not any(lamp.searches_rendering for lamp in lamps):
         return
-    sentences = rendering_sentences(renderings_of(look.lighting))
+    sentences = report.rendering_sentences(renderings_of(look.lighting))
     for sentence in sentences[:SHORT_LIST_LIGHTS]:
         terminal.tell(sentence)
     if more := sentences[SHORT_LIST_LIGHTS:]:
@@ -134,37 +107,37 @@ def _sentences(look: Look, table: Table) -> list[str]:
 
     In full, return all reasons and the certainty. Sentences end with the options to change.
     """
-    choice = closer_choice(look.analysis.color_choices)
+    choice = report.closer_choice(look.analysis.color_choices)
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
     limits, appearance = _limit_sentences(look), look.analysis.appearance
-    down = compensation_sentences(appearance.compensating_lights)
+    down = report.compensation_sentences(appearance.compensating_lights)
     if table == "short":
         limits = [] if appearance.is_close else limits[:1]
         # One line offers other colours, the one that says which light turns.
-        if closer and any(ANY_COLOR in Sentence(sentence).parts for sentence in limits):
+        if closer and any(report.ANY_COLOR in Sentence(sentence).parts for sentence in limits):
             limits = []
         return [*limits, *down, *closer]
     sentences = [
-        *error_sentences(look.diagnosis, appearance, holds=[*limits, *down]),
+        *report.error_sentences(look.diagnosis, appearance, holds=[*limits, *down]),
         *closer,
     ]
     if look.uncertainty is not None:
-        sentences.append(uncertainty_sentence(look.basis, look.solution, look.uncertainty))
+        sentences.append(report.uncertainty_sentence(look.basis, look.solution, look.uncertainty))
     return sentences
 
 
 def _limit_sentences(look: Look) -> list[str]:
     """Return the reasons that keep the lights from the painting, the main first, with options."""
     if not look.analysis.appearance.reasons:
-        return bound_sentences(look.diagnosis)
+        return report.bound_sentences(look.diagnosis)
     sentences = [_spoken_cause(look, reason) for reason in look.analysis.appearance.reasons]
     return [sentence for sentence in sentences if sentence][:2]
 
 
 def _spoken_cause(look: Look, reason: Reason) -> str:
     """Return a reason in words, with the options to leave out."""
-    about = spoken_about(look.analysis.appearance)
-    sentence = spoken_cause(reason, weaker="--hold", about=about)
+    about = report.spoken_about(look.analysis.appearance)
+    sentence = report.spoken_cause(reason, weaker="--hold", about=about)
     keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
         f"--{'limit' if key == 'limits' else key} {name}"
@@ -184,7 +157,7 @@ def spoken_settings(settings: Settings) -> str:
     """Return the settings in use, given or by default: `space display, hold 1, ...`."""
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
     transform = values.pop("transform")
-    values |= {"view": transform and spoken_view(transform), "command": None}
+    values |= {"view": transform and report.spoken_view(transform), "command": None}
     # Mention skipped stages, but not stages that always run.
     nonempty = {k: v for k, v in values.items() if v is not False and v not in (None, "")}
     return ", ".join(f"{k} {v}" for k, v in nonempty.items() if k not in ("verify", "report"))
@@ -200,7 +173,7 @@ def undetermined_remark(look: Look) -> str:
         notes.append(f"the picture shows nothing of {_spoken(dark)}: left unchanged")
     if unseen:
         notes.append(f"no painted pixel sees {_spoken(unseen)}: left unchanged")
-    notes += partly_reached(look.lighting)
+    notes += report.partly_reached(look.lighting)
     notes += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
     return f"the painting leaves lights open: {some_of(notes, joint='; ')}" if notes else ""
 
@@ -213,8 +186,8 @@ def _spoken(names: Sequence[str]) -> str:
 def _show_short(look: Look) -> None:
     """Print a row for each important light, in 80 columns, and a summary of the others."""
     lights, current_lights = look.lighting.lights, look.basis.lights
-    shares = energy_shares(look.basis, look.lighting)
-    errors = spoken_errors(look.uncertainty, len(shares))
+    shares = report.energy_shares(look.basis, look.lighting)
+    errors = report.spoken_errors(look.uncertainty, len(shares))
     images = [image for image in light_images(current_lights) if image.is_whole]
     in_images = {int(k) for image in images for k in image.lights}
     important = _important_lights(look, in_images)
@@ -234,7 +207,7 @@ def _show_short(look: Look) -> None:
             room=NAME_WIDTH,
         )
     terminal.print_table(table, swatches)
-    if note := untold_lights(look.lighting):
+    if note := report.untold_lights(look.lighting):
         terminal.tell(note)
     if other_indices := sorted(set(range(len(lights))) - set(important) - in_images):
         terminal.tell(_other_lights_text(look, other_indices))
@@ -285,8 +258,8 @@ def _other_lights_text(look: Look, other_indices: list[int]) -> str:
         "as they were": light_changes.count("0.0") + light_changes.count("unchanged"),
     }
     text = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-    share = energy_shares(look.basis, look.lighting)[other_indices].sum()
-    percent = spoken_percent(float(share))
+    share = report.energy_shares(look.basis, look.lighting)[other_indices].sum()
+    percent = report.spoken_percent(float(share))
     return f"and {len(other_indices)} more ({text}): together {percent} of the picture"
 
 
@@ -332,13 +305,13 @@ def _spoken_color(look: Look, light: LightSetting) -> str:
 
 def _show_all(look: Look) -> None:
     """Print a row for each light: before, solved, certainty, and share of the picture."""
-    shares = energy_shares(look.basis, look.lighting)
+    shares = report.energy_shares(look.basis, look.lighting)
     has_constraints = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     columns = ["constraint (* limits it)"] if has_constraints else []
     table = terminal.table(*headings, *amounts, *columns)
-    errors = spoken_errors(look.uncertainty, len(shares))
+    errors = report.spoken_errors(look.uncertainty, len(shares))
     for k, (light, current_light) in enumerate(
         zip(look.lighting.lights, look.basis.lights, strict=True)
     ):
@@ -356,13 +329,13 @@ def _show_all(look: Look) -> None:
             *([_constraint_text(light)] if has_constraints else []),
         )
     terminal.print_table(table)
-    if note := spoken_preference(look.lighting.lights):
+    if note := report.spoken_preference(look.lighting.lights):
         terminal.tell(note)
 
 
 def _constraint_text(light: LightSetting) -> str:
     """Return the constraint on a light, of a lamp the drives of its emitters."""
-    text = light.constraint if light.lamp is None else spoken_lamp(light)
+    text = light.constraint if light.lamp is None else report.spoken_lamp(light)
     return text + "*" * light.is_active
 
 
@@ -372,5 +345,5 @@ def _emission_text(light: LightSetting) -> str:
     emission_text = terminal.numbers(light.emission)
     if all(light.reached):
         return emission_text
-    note = f"{unreached_channels(light)} unchanged" if any(light.reached) else "unchanged"
+    note = f"{report.unreached_channels(light)} unchanged" if any(light.reached) else "unchanged"
     return f"{emission_text} ({note})"

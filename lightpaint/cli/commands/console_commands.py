@@ -8,40 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from lightpaint import dmx
 from lightpaint.cli.options.console_options import RigFile, Sending
 from lightpaint.cli.output import documents, lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.display_text import some_names, some_of
-from lightpaint.dmx import (
-    LOOPBACK,
-    PRIORITY,
-    PROTOCOLS,
-    ConsoleLink,
-    ConsoleReceiver,
-    ConsoleRig,
-    KindSummary,
-    RigDrives,
-    RigFixture,
-    Room,
-    RoomFiles,
-    Show,
-    address_text,
-    aimed_rig,
-    cd_per_unit,
-    check_drives,
-    decode_levels,
-    directions_of,
-    drives_of,
-    lights_of,
-    lights_text,
-    network_universes,
-    read_show,
-    room_of_scene,
-    room_of_show,
-    scene_text,
-    spectrum_tables,
-)
 from lightpaint.errors import ConsoleError, LightingError, OutputError, RigError
 from lightpaint.files import check_files, check_writable, write_bytes, write_text
 from lightpaint.lighting import Lighting, read_lighting
@@ -77,22 +49,22 @@ def rig(
     """Run `lightpaint rig SHOW.mvr -o F.xml`."""
     if room is not None and only_lights:
         raise RigError("--only-lights leaves the room out: give --room, or --only-lights")
-    content = read_show(
+    content = dmx.read_show(
         show, gdtf_folder=gdtf_folder, zoom=zoom, pixels=pixels, usual_colors=usual_colors
     )
-    folder, surroundings = output.parent, RoomFiles(Room(), {})
+    folder, surroundings = output.parent, dmx.RoomFiles(dmx.Room(), {})
     if room is not None:
-        surroundings = RoomFiles(room_of_scene(room, folder), {})
+        surroundings = dmx.RoomFiles(dmx.room_of_scene(room, folder), {})
     elif not only_lights:
-        surroundings = room_of_show(show, content.models)
-    unit = cd_per_unit(content.rig)
+        surroundings = dmx.room_of_show(show, content.models)
+    unit = dmx.cd_per_unit(content.rig)
     texts = {
-        output: scene_text(content.rig, unit, None if only_lights else surroundings.room),
-        lights_file_beside(output): lights_text(
+        output: dmx.scene_text(content.rig, unit, None if only_lights else surroundings.room),
+        lights_file_beside(output): dmx.lights_text(
             content.rig, unit, open_wheels=open_wheels, stem=output.stem
         ),
     }
-    tables = spectrum_tables(content.rig, output.stem)
+    tables = dmx.spectrum_tables(content.rig, output.stem)
     texts |= {folder / name: text for name, text in tables.items()}
     files = [*texts, *(folder / name for name in surroundings.files)]
     _check(files, [show, *([] if room is None else [room])], folder, force=force)
@@ -119,7 +91,7 @@ def _check(files: list[Path], inputs: list[Path], folder: Path, *, force: bool) 
         )
 
 
-def _print(show: Show, files: list[Path]) -> None:
+def _print(show: dmx.Show, files: list[Path]) -> None:
     """Print a row for each type, with what is to know of it below, and the main files."""
     table = terminal.table("fixtures", "type", "mode", "emitters", "light from")
     for kind in show.kinds:
@@ -129,7 +101,7 @@ def _print(show: Show, files: list[Path]) -> None:
     for kind in show.kinds:
         for remark in kind.remarks:
             terminal.write(spoken(Sentence(f"{kind.kind}: ", remark)))
-    count = len(lights_of(show.rig))
+    count = len(dmx.lights_of(show.rig))
     universes = ", ".join(map(str, show.rig.universes))
     terminal.write(f"{count} {'lights' if count > 1 else 'light'}, universes {universes}")
     for file in files[:2]:
@@ -137,7 +109,7 @@ def _print(show: Show, files: list[Path]) -> None:
 
 
 def _document(
-    path: Path, files: list[Path], show: Show, unit: float, remarks: list[str]
+    path: Path, files: list[Path], show: dmx.Show, unit: float, remarks: list[str]
 ) -> dict[str, Any]:
     """Return the document of `rig`."""
     fixtures = [
@@ -146,7 +118,7 @@ def _document(
             "name": fixture.name,
             "type": fixture.kind,
             "mode": fixture.mode,
-            "addresses": {str(k): address_text(x) for k, x in fixture.addresses.items()},
+            "addresses": {str(k): dmx.address_text(x) for k, x in fixture.addresses.items()},
             "lights": [light.name for light in fixture.lights],
         }
         for fixture in show.rig.fixtures
@@ -162,12 +134,12 @@ def _document(
     )
 
 
-def _kind(kind: KindSummary) -> dict[str, Any]:
+def _kind(kind: dmx.KindSummary) -> dict[str, Any]:
     fields = {("type" if key == "kind" else key): value for key, value in vars(kind).items()}
     return {**fields, "remarks": [spoken(x) for x in kind.remarks]}
 
 
-def read_rig_file(rig: RigFile) -> ConsoleRig:
+def read_rig_file(rig: RigFile) -> dmx.ConsoleRig:
     """Return a rig. Raises RigError for anything else than an MVR with fixtures."""
     from lightpaint.dmx import read_rig
 
@@ -175,12 +147,12 @@ def read_rig_file(rig: RigFile) -> ConsoleRig:
     return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels, usual_colors=True)
 
 
-def read_answer(path: Path) -> tuple[Lighting, RigDrives]:
+def read_answer(path: Path) -> tuple[Lighting, dmx.RigDrives]:
     """Return a lighting and its drives. Raises LightingError if none of its lights has
     emitters."""
     finish(path.parent)
     lighting = read_lighting(path)
-    drives = drives_of(lighting)
+    drives = dmx.drives_of(lighting)
     if not drives:
         raise LightingError(
             f"{path} has no drives: none of its lights has emitters, as in a scene that was "
@@ -196,9 +168,9 @@ def send(
     if dump is not None:
         _check_dump(dump, [lighting, rig.path], force=force)
     (answer, drives), fixtures = read_answer(lighting), read_rig_file(rig)
-    check_drives(fixtures, drives)
+    dmx.check_drives(fixtures, drives)
     if sending.positions:
-        fixtures, remarks = aimed_rig(fixtures, directions_of(answer))
+        fixtures, remarks = dmx.aimed_rig(fixtures, dmx.directions_of(answer))
         for remark in remarks:
             terminal.say(remark)
     universes = _universes_of(fixtures, sending)
@@ -219,11 +191,11 @@ def send(
     return CommandOutcome(lambda: where | level_document(fixtures, drives, universes))
 
 
-def _universes_of(rig: ConsoleRig, sending: Sending) -> dict[int, int]:
+def _universes_of(rig: dmx.ConsoleRig, sending: Sending) -> dict[int, int]:
     """Return the universes of the network by the universes of the rig; without a target the
     universes of sACN."""
-    protocol = PROTOCOLS["sacn"] if sending.target is None else sending.target.protocol
-    return network_universes(rig, protocol, sending.universes)
+    protocol = dmx.PROTOCOLS["sacn"] if sending.target is None else sending.target.protocol
+    return dmx.network_universes(rig, protocol, sending.universes)
 
 
 def _check_dump(dump: Path, inputs: list[Path], *, force: bool) -> None:
@@ -236,7 +208,7 @@ def _check_dump(dump: Path, inputs: list[Path], *, force: bool) -> None:
 
 
 def _write_dump(
-    dump: Path, rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]
+    dump: Path, rig: dmx.ConsoleRig, drives: dmx.RigDrives, universes: Mapping[int, int]
 ) -> None:
     is_csv = dump.suffix.lower() == ".csv"
     text = (
@@ -259,13 +231,13 @@ def _print_rows(rows: list[LevelRow]) -> None:
 
 
 @contextmanager
-def _link(rig: ConsoleRig, sending: Sending) -> Iterator[ConsoleLink]:
+def _link(rig: dmx.ConsoleRig, sending: Sending) -> Iterator[dmx.ConsoleLink]:
     """Yield an open link, and end it whole: an interrupt waits until its last packet has left."""
     assert sending.target is not None
-    link = ConsoleLink.open(
+    link = dmx.ConsoleLink.open(
         *(sending.target, rig),
         universes=sending.universes,
-        priority=PRIORITY if sending.priority is None else sending.priority,
+        priority=dmx.PRIORITY if sending.priority is None else sending.priority,
         fps=sending.fps,
         interface=sending.interface,
     )
@@ -280,7 +252,7 @@ def _how_to_end(sending: Sending) -> str:
     return " (Ctrl-C ends it)" if sending.until == "ctrl-c" else ""
 
 
-def _send(link: ConsoleLink, drives: RigDrives, sending: Sending) -> None:
+def _send(link: dmx.ConsoleLink, drives: dmx.RigDrives, sending: Sending) -> None:
     """Show drives until the end. Raises ConsoleError if the network takes no packet."""
     end_s = time.monotonic() + sending.until if isinstance(sending.until, float) else None
     had_trouble = False
@@ -326,10 +298,12 @@ def listen(
     fixtures = None if rig is None else read_rig_file(rig)
     if fixtures is None and universes:
         raise ConsoleError("--universe belongs to the universes of a rig: give --rig, too")
-    known = PROTOCOLS[protocol]
-    numbers = {} if fixtures is None else network_universes(fixtures, known, universes)
-    at = address or LOOPBACK
-    with ConsoleReceiver.open(known, address=at, port=port, groups=numbers.values()) as receiver:
+    known = dmx.PROTOCOLS[protocol]
+    numbers = {} if fixtures is None else dmx.network_universes(fixtures, known, universes)
+    at = address or dmx.LOOPBACK
+    with dmx.ConsoleReceiver.open(
+        known, address=at, port=port, groups=numbers.values()
+    ) as receiver:
         monitor = ConsoleMonitor(receiver, fixtures, numbers)
         how = " (Ctrl-C ends it)" if seconds is None else ""
         _announce(f"listening for {known.name} at {at}, port {receiver.port}{how}")
@@ -355,7 +329,10 @@ class ConsoleMonitor:
     """
 
     def __init__(
-        self, receiver: ConsoleReceiver, rig: ConsoleRig | None, universes: Mapping[int, int]
+        self,
+        receiver: dmx.ConsoleReceiver,
+        rig: dmx.ConsoleRig | None,
+        universes: Mapping[int, int],
     ) -> None:
         self._receiver, self._rig, self._universes = receiver, rig, universes
         self._printed: dict[str, str] = {}
@@ -437,14 +414,14 @@ class ConsoleMonitor:
         owners = self._rig.owners
         return {
             light: drives
-            for light, drives in decode_levels(self._rig, levels).items()
+            for light, drives in dmx.decode_levels(self._rig, levels).items()
             if drives and _universes_in(owners[light]) <= set(levels)
         }
 
 
-def _universes_in(fixture: RigFixture) -> set[int]:
+def _universes_in(fixture: dmx.RigFixture) -> set[int]:
     return {x for channel in fixture.channels for x, _ in fixture.places(channel)}
 
 
-def _address_of(fixture: RigFixture) -> str:
-    return " and ".join(map(address_text, fixture.addresses.values()))
+def _address_of(fixture: dmx.RigFixture) -> str:
+    return " and ".join(map(dmx.address_text, fixture.addresses.values()))

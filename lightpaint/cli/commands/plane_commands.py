@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import photometry, pipeline
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import BasisLight
 from lightpaint.basis.render import basis_lights
@@ -18,31 +19,8 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting import Constraints, Scale, constraints_of, read_lighting
-from lightpaint.photometry import (
-    POINTS,
-    PRESETS,
-    Illuminance,
-    measured_origin,
-    missed_wishes,
-    readings_document,
-    readings_files,
-    write_readings,
-)
 from lightpaint.photometry.measure import measure_glare, measure_illuminance
 from lightpaint.photometry.planes_file import planes_file_beside, read_planes
-from lightpaint.pipeline import (
-    PLAN,
-    LightPlan,
-    SceneFile,
-    Settings,
-    check_reached,
-    constraints_and_scale,
-    new_answer,
-    no_glare_remark,
-    plan_folder,
-    plan_lighting,
-    write_planes,
-)
 from lightpaint.progress import stage
 from lightpaint.relit import scene_of
 from lightpaint.report import glare_sentences, planes_numbers, spoken_drives
@@ -54,11 +32,11 @@ from lightpaint.version import __version__
 
 def measure(
     *,
-    scene: SceneFile,
+    scene: pipeline.SceneFile,
     planes: Path | None,
     lighting: Path | None,
     output: Path,
-    settings: Settings,
+    settings: pipeline.Settings,
 ) -> CommandOutcome:
     """Run `lightpaint measure SCENE`."""
     content, emission, unit, unscaled = _lit_scene(scene, lighting, settings)
@@ -74,9 +52,9 @@ def measure(
         terminal.say(remark)
     weights = _weights(content, emission)
     inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
-    files = [output / name for name in readings_files(x.name for x in found.planes)]
+    files = [output / name for name in photometry.readings_files(x.name for x in found.planes)]
     _check(output, files, inputs, force=settings.force)
-    if (earlier := measured_origin(output)) is not None:
+    if (earlier := photometry.measured_origin(output)) is not None:
         terminal.say(f"{output} had a measurement, {earlier}: it is replaced (-o names another)")
     with terminal.TerminalListener() as listen:
         options: dict[str, Any] = {
@@ -88,22 +66,24 @@ def measure(
             "progress": listen,
         }
         measured = measure_illuminance(content, found.planes, spp=settings.spp, **options)
-        check_reached(measured, unscaled, weights)
+        pipeline.check_reached(measured, unscaled, weights)
         rates_glare = found.observers and not unscaled
         glare = measure_glare(content, found.observers, **options) if rates_glare else None
     if unscaled:
-        terminal.say(no_glare_remark(unscaled))
+        terminal.say(pipeline.no_glare_remark(unscaled))
     origin = content.path.name + ("" if lighting is None else f" lit by {lighting.name}")
     with staged(output) as folder:
-        write_readings(folder, measured, weights, origin, glare=glare)
+        photometry.write_readings(folder, measured, weights, origin, glare=glare)
     _print(measured, weights)
     if glare is not None:
         show_glare(readings := glare.readings(weights))
         for sentence in glare_sentences(readings):
             terminal.tell(sentence)
-    terminal.write(f"{output / POINTS}: all points; a picture of each plane beside it")
+    terminal.write(f"{output / photometry.POINTS}: all points; a picture of each plane beside it")
     written = {"scene": str(content.path), "files": [*map(str, files)]}
-    return CommandOutcome(lambda: readings_document(measured, weights, glare=glare) | written)
+    return CommandOutcome(
+        lambda: photometry.readings_document(measured, weights, glare=glare) | written
+    )
 
 
 def _luminaire_remarks(scene: Scene) -> list[str]:
@@ -112,7 +92,7 @@ def _luminaire_remarks(scene: Scene) -> list[str]:
 
 
 def _lit_scene(
-    source: SceneFile, lighting: Path | None, settings: Settings
+    source: pipeline.SceneFile, lighting: Path | None, settings: pipeline.Settings
 ) -> tuple[Scene, Mapping[str, RGB] | None, float, tuple[BasisLight, ...]]:
     """Return the scene, the emissions of a lighting, cd/m² of a radiance of 1, and the lights of
     which that is a guess.
@@ -121,7 +101,7 @@ def _lit_scene(
     """
     scene, emission = source.content, None
     own = Scale.of(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
-    unscaled = constraints_and_scale(scene, Constraints(), settings)[1].unscaled
+    unscaled = pipeline.constraints_and_scale(scene, Constraints(), settings)[1].unscaled
     if lighting is not None:
         finish(lighting.parent)
         answer = read_lighting(lighting)
@@ -161,7 +141,7 @@ def _check(folder: Path, files: Sequence[Path], inputs: Sequence[Path], *, force
     check_writable(folder)
     finish(folder)
     existing_files = [file for file in files if file.exists()]
-    if existing_files and not force and measured_origin(folder) is None:
+    if existing_files and not force and photometry.measured_origin(folder) is None:
         raise OutputError(
             f"{existing_files[0]} exists and is of no measurement: name another folder with -o, "
             "or pass ",
@@ -169,7 +149,7 @@ def _check(folder: Path, files: Sequence[Path], inputs: Sequence[Path], *, force
         )
 
 
-def _print(measured: Illuminance, weights: Doubles) -> None:
+def _print(measured: photometry.Illuminance, weights: Doubles) -> None:
     """Print a row for each plane, the wishes that are missed, and where presets are from."""
     table = terminal.table("plane", "points", "Em lx", "±", "U0", "±", "least lx", "most lx")
     for name, reading in measured.readings(weights).items():
@@ -184,19 +164,19 @@ def _print(measured: Illuminance, weights: Doubles) -> None:
             f"{reading.most:.4g}",
         )
     terminal.print_table(table)
-    for text in missed_wishes(measured, weights):
+    for text in photometry.missed_wishes(measured, weights):
         terminal.write(text)
     for name in sorted({plane.wishes.preset for plane in measured.planes} - {""}):
-        terminal.say(f"{name}: {PRESETS[name]}")
+        terminal.say(f"{name}: {photometry.PRESETS[name]}")
 
 
 def plan(
     *,
-    scene: SceneFile,
+    scene: pipeline.SceneFile,
     planes: Path | None,
     output: Path | None,
     constraints: Constraints,
-    settings: Settings,
+    settings: pipeline.Settings,
 ) -> CommandOutcome:
     """Run `lightpaint plan SCENE`."""
     content = scene.content
@@ -207,20 +187,20 @@ def plan(
             "wished for there, or name one with --planes"
         )
     folder = output or Path(f"{content.path.stem}-plan")
-    results = plan_folder(content, path, folder, force=settings.force)
+    results = pipeline.plan_folder(content, path, folder, force=settings.force)
     results.check()
     for remark in _luminaire_remarks(content):
         terminal.say(remark)
     with terminal.TerminalListener() as listen:
-        found = plan_lighting(
+        found = pipeline.plan_lighting(
             content, path, constraints=constraints, settings=settings, progress=listen
         )
-    with new_answer(results, found.lighting, scene=content) as answer:
+    with pipeline.new_answer(results, found.lighting, scene=content) as answer:
         text = json.dumps(_numbers(found), indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(answer.path / PLAN, text + "\n")
+        write_text(answer.path / pipeline.PLAN, text + "\n")
         origin, illuminance = f"{content.path.name} as planned", found.planes.wished.illuminance
         lit, glare = found.planes.weights_by_case, found.planes.glare
-        write_planes(answer.path, illuminance, lit, origin, glare=glare)
+        pipeline.write_planes(answer.path, illuminance, lit, origin, glare=glare)
     show_planes(found.planes)
     _show_lamps(found)
     terminal.write(f"results in {folder}/")
@@ -231,7 +211,7 @@ def plan(
     )
 
 
-def _numbers(found: LightPlan) -> dict[str, Any]:
+def _numbers(found: pipeline.LightPlan) -> dict[str, Any]:
     return {
         "format": "lightpaint-plan 1",
         "lightpaint": __version__,
@@ -239,7 +219,7 @@ def _numbers(found: LightPlan) -> dict[str, Any]:
     }
 
 
-def _show_lamps(found: LightPlan) -> None:
+def _show_lamps(found: pipeline.LightPlan) -> None:
     """Print the drives of all lamps."""
     table = terminal.table("lamp", "drive", "W")
     for light in found.lighting.lights:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import relit
 from lightpaint.arrays import Floats, Position
 from lightpaint.basis import LightGroups, find_frames, first_frame, is_pattern
 from lightpaint.basis.cache import basis_cache as bases
@@ -30,15 +31,6 @@ from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.paint import SESSION_FILE, read_kept_looks
 from lightpaint.pipeline import GroupsFile, SceneFile, content
-from lightpaint.relit import (
-    FORMS,
-    Cue,
-    Source,
-    cue_list_csv,
-    names_of_forms,
-    write_content,
-    writers_of,
-)
 from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish
@@ -66,8 +58,8 @@ def export(
         raise LightpaintError(
             f"{others[0]} takes a lighting.json, and {sessions[0]} is a session, which cues take"
         )
-    if unknown := [form for form in others if form not in FORMS]:
-        known = ", ".join((*FORMS, CUES))
+    if unknown := [form for form in others if form not in relit.FORMS]:
+        known = ", ".join((*relit.FORMS, CUES))
         raise LightpaintError(f"there is no form {unknown[0]!r}: known are {known}")
     if len(lightings) > 1 and others:
         raise LightpaintError(
@@ -79,14 +71,14 @@ def export(
         raise LightpaintError("--positions belongs to cues: leave it out, or add cues to --to")
     folder = output or (lighting if lighting.is_dir() else lighting.parent)
     listen = terminal.TerminalListener()
-    writers, remark, source = dict[str, Callable[[], str | bytes | Floats]](), "", Source()
+    writers, remark, source = dict[str, Callable[[], str | bytes | Floats]](), "", relit.Source()
     if others:
         finish(lighting.parent)
         answer = read_lighting(lighting)
         show = None if rig is None or (CUES in forms and "mvr" not in forms) else rig.path
-        source = Source(content(scene), _light_groups(groups, answer), stage, show)
-        names = names_of_forms(others, source)
-        writers, remark = writers_of(names, answer, source, folder, listen)
+        source = relit.Source(content(scene), _light_groups(groups, answer), stage, show)
+        names = relit.names_of_forms(others, source)
+        writers, remark = relit.writers_of(names, answer, source, folder, listen)
     if CUES in forms and rig is not None:
         text, remarks = cue_list(lightings, rig, fade_s=fade_s, positions=positions)
         writers[CUE_FILE] = lambda: text
@@ -105,7 +97,7 @@ def export(
         )
     contents = {file: make() for file, make in file_writers.items()}
     for file, content_made in contents.items():
-        write_content(file, content_made)
+        relit.write_content(file, content_made)
         terminal.write(str(file))
     if remark:
         listen.say(remark)
@@ -226,17 +218,17 @@ def cue_list(
             else [_cue_of_lighting(path, fade_s=fade_s)]
         )
     if not positions:
-        cues = [Cue(x.label, x.fade_s, x.drives) for x in cues]
+        cues = [relit.Cue(x.label, x.fade_s, x.drives) for x in cues]
     remarks = [r for x in cues if x.directions for r in aimed_rig(fixtures, x.directions)[1]]
-    return cue_list_csv(fixtures, cues), [*dict.fromkeys(remarks)]
+    return relit.cue_list_csv(fixtures, cues), [*dict.fromkeys(remarks)]
 
 
-def _cue_of_lighting(path: Path, *, fade_s: float) -> Cue:
+def _cue_of_lighting(path: Path, *, fade_s: float) -> relit.Cue:
     lighting, drives = console_commands.read_answer(path)
-    return Cue(_label_of(path), fade_s, drives, directions_of(lighting))
+    return relit.Cue(_label_of(path), fade_s, drives, directions_of(lighting))
 
 
-def _cues_of_session(path: Path, rig: ConsoleRig, *, fade_s: float) -> list[Cue]:
+def _cues_of_session(path: Path, rig: ConsoleRig, *, fade_s: float) -> list[relit.Cue]:
     """Return a cue for each look of a session."""
     file = path / SESSION_FILE if path.is_dir() else path
     looks = read_kept_looks(file)
@@ -250,7 +242,7 @@ def _cues_of_session(path: Path, rig: ConsoleRig, *, fade_s: float) -> list[Cue]
                 "with lights that have emitters"
             )
         placed = look.requests.placed
-        cues.append(Cue(look.name, fade_s, look.drives, _directions(placed, rig)))
+        cues.append(relit.Cue(look.name, fade_s, look.drives, _directions(placed, rig)))
     return cues
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from lightpaint import pipeline
 from lightpaint.basis import Basis, write_basis
 from lightpaint.basis.cache import write_from_cache
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
@@ -23,37 +24,6 @@ from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS, BackendError, ConstraintError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting import FullLamp, agreed_scale, read_lighting
-from lightpaint.pipeline import (
-    BasisFile,
-    GroupsFile,
-    Job,
-    Look,
-    PaintedView,
-    Painting,
-    ResultFolder,
-    SceneFile,
-    Settings,
-    check_nothing_unused,
-    check_sheet,
-    frames_to_write,
-    lamps_of_scene,
-    look_of_basis,
-    obtain,
-    relight_frames,
-    relight_look,
-    relit_folder,
-    remarks_of_film,
-    remarks_of_memory,
-    remarks_of_scene,
-    render_look,
-    render_sheet,
-    render_template,
-    result_folders,
-    run,
-    scaled_constraints,
-    template_of_basis,
-    verify_result,
-)
 from lightpaint.placement import PlacementRecord, record_of
 from lightpaint.progress import stage
 from lightpaint.relit import EXPORTS, solved_identity
@@ -74,7 +44,7 @@ NO_REQUIREMENTS = Tolerances()
 
 def solve(
     *,
-    jobs: Sequence[Job],
+    jobs: Sequence[pipeline.Job],
     table: Table = "short",
     tolerances: Tolerances = NO_REQUIREMENTS,
     look_set: "LookSet | None" = None,
@@ -85,9 +55,9 @@ def solve(
     look_set: the set of looks, if there are several. frames: the frames of a shot to write, as
     `parse_frames` reads them.
     """
-    chosen_frames = [frames_to_write(job, frames) for job in jobs]
+    chosen_frames = [pipeline.frames_to_write(job, frames) for job in jobs]
     listen, shared = terminal.TerminalListener(), _SharedWork()
-    results: list[tuple[Job, PaintedView, Look]] = []
+    results: list[tuple[pipeline.Job, pipeline.PaintedView, pipeline.Look]] = []
     frame_files: list[Path] = []
     # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
@@ -98,7 +68,9 @@ def solve(
         job = shared.prepare(job, is_variation=is_variation)
         try:
             with listen:
-                looks = run(job, listen, bases=None if shared.bases is None else [*shared.bases])
+                looks = pipeline.run(
+                    job, listen, bases=None if shared.bases is None else [*shared.bases]
+                )
             shared.take_from(looks)
             if look_set is not None:
                 bases = [look.basis for look in looks]
@@ -118,11 +90,13 @@ def solve(
     return _outcome(results, tolerances, look_set, frame_files)
 
 
-def _write_frames(job: Job, frames: Sequence[int], listen: terminal.TerminalListener) -> list[Path]:
+def _write_frames(
+    job: pipeline.Job, frames: Sequence[int], listen: terminal.TerminalListener
+) -> list[Path]:
     """Write frames of a shot, and print which."""
     try:
         with listen:
-            files = relight_frames(job, frames=frames, progress=listen)
+            files = pipeline.relight_frames(job, frames=frames, progress=listen)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("frames that are written stay; the same command goes on") from None
     count = f" to {files[-1].name}, {len(files)} files" if len(files) > 1 else ""
@@ -139,7 +113,7 @@ class _SharedWork:
         self.bases: list[Basis] | None = None
         self._placement: PlacementRecord | None = None
 
-    def prepare(self, job: Job, *, is_variation: bool) -> Job:
+    def prepare(self, job: pipeline.Job, *, is_variation: bool) -> pipeline.Job:
         """Return the next job: a variation has the places that were found for its original."""
         if self._placement is None:
             return job
@@ -149,7 +123,7 @@ class _SharedWork:
         self.bases, self._placement = None, None
         return job
 
-    def take_from(self, looks: Sequence[Look]) -> None:
+    def take_from(self, looks: Sequence[pipeline.Look]) -> None:
         """Keep the results of a job for those that follow."""
         self.bases = [look.basis for look in looks]
         if (placement := looks[0].placement) is not None and not placement.is_empty:
@@ -157,7 +131,7 @@ class _SharedWork:
 
 
 def _outcome(
-    results: Sequence[tuple[Job, PaintedView, Look]],
+    results: Sequence[tuple[pipeline.Job, pipeline.PaintedView, pipeline.Look]],
     tolerances: Tolerances,
     look_set: "LookSet | None",
     frame_files: Sequence[Path],
@@ -186,7 +160,7 @@ def _outcome(
     return CommandOutcome(document, 1 if shortfalls or has_missed_wishes or has_failures else 0)
 
 
-def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
+def _show(job: pipeline.Job, looks: Sequence[pipeline.Look], table: Table) -> None:
     """Print the results of one job."""
     for view, look in zip(job.views, looks, strict=True):
         if job.by_sensor or len(looks) > 1:
@@ -209,7 +183,7 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
 
 def lights(
     *,
-    scene: SceneFile,
+    scene: pipeline.SceneFile,
     cd_per_unit: float | None,
     sheet: Path | None,
     is_named: bool = True,
@@ -224,9 +198,9 @@ def lights(
     cd_per_unit = agreed_scale(content.cd_per_unit, cd_per_unit)
     lamps, cd_per_unit = _lamps(content, cd_per_unit)
     if sheet is not None and is_named:
-        check_sheet(content, sheet, force=force)
+        pipeline.check_sheet(content, sheet, force=force)
     note_scene(content)
-    for remark in remarks_of_scene(content):
+    for remark in pipeline.remarks_of_scene(content):
         terminal.say(remark)
     tables.show_lights(content, cd_per_unit, lamps)
     is_drawn = sheet is not None and _draw_sheet(content, sheet, is_named=is_named, force=force)
@@ -241,8 +215,8 @@ def _lamps(scene: Scene, cd_per_unit: float | None) -> tuple[Mapping[str, FullLa
     candelas of an intensity of 1, as given or as the lights file says.
     """
     try:
-        scaled = scaled_constraints(scene, cd_per_unit)
-        return lamps_of_scene(scene, scaled), scaled.cd_per_unit
+        scaled = pipeline.scaled_constraints(scene, cd_per_unit)
+        return pipeline.lamps_of_scene(scene, scaled), scaled.cd_per_unit
     except ConstraintError as error:
         terminal.say(error.sentence)
         return {}, cd_per_unit
@@ -251,9 +225,9 @@ def _lamps(scene: Scene, cd_per_unit: float | None) -> tuple[Mapping[str, FullLa
 def _draw_sheet(scene: Scene, sheet: Path, *, is_named: bool, force: bool) -> bool:
     """Write the light sheet; print the reason and return False if it cannot be written."""
     try:
-        check_sheet(scene, sheet, force=force)
+        pipeline.check_sheet(scene, sheet, force=force)
         with terminal.TerminalListener() as listen:
-            reason = render_sheet(scene, sheet, listen)
+            reason = pipeline.render_sheet(scene, sheet, listen)
     except (OutputError, BackendError) as error:
         if is_named and isinstance(error, OutputError):
             raise
@@ -276,7 +250,9 @@ def note_scene(scene: Scene) -> None:
     )
 
 
-def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutcome:
+def basis(
+    *, scene: pipeline.SceneFile, output: Path, settings: pipeline.Settings
+) -> CommandOutcome:
     """Run `lightpaint basis SCENE -o F.basis.exr`."""
     if output.suffix.lower() != ".exr":
         raise OutputError(f"{output} must end in .exr: a basis is an EXR")
@@ -285,14 +261,14 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
     note_scene(scene_on_film)
     check_files([output], scene_on_film.read_files)
     with terminal.TerminalListener() as listen:
-        of_film = remarks_of_film(scene_on_film, settings)
+        of_film = pipeline.remarks_of_film(scene_on_film, settings)
         for remark in (
-            *remarks_of_scene(scene_on_film),
+            *pipeline.remarks_of_scene(scene_on_film),
             *of_film,
-            *remarks_of_memory(scene_on_film, settings.basis_spp),
+            *pipeline.remarks_of_memory(scene_on_film, settings.basis_spp),
         ):
             listen.say(remark)
-        basis_on_film = obtain(scene_on_film, settings, listen)
+        basis_on_film = pipeline.obtain(scene_on_film, settings, listen)
         write = write_from_cache if settings.use_cache else write_basis
         with stage("writing the basis", listen):
             write(output, basis_on_film)
@@ -304,20 +280,20 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
 
 def template(
     *,
-    source: SceneFile | BasisFile | GroupsFile,
+    source: pipeline.SceneFile | pipeline.BasisFile | pipeline.GroupsFile,
     output: Path,
     transform: ViewTransform | None,
-    settings: Settings,
+    settings: pipeline.Settings,
     force: bool,
 ) -> CommandOutcome:
     """Run `lightpaint template SCENE|BASIS|LIGHTS -o DIR`."""
     _check_template(output, force=force)
-    if not isinstance(source, SceneFile):
+    if not isinstance(source, pipeline.SceneFile):
         return _template_of_basis(source, output, transform, settings)
     scene_on_film = on_film(source.content, settings.quality, settings.resolution)
     note_scene(scene_on_film)
     check_files(_replaced_files(output), scene_on_film.read_files)
-    for remark in remarks_of_film(scene_on_film, settings):
+    for remark in pipeline.remarks_of_film(scene_on_film, settings):
         terminal.say(remark)
     options: dict[str, Any] = {
         "transform": transform,
@@ -327,23 +303,26 @@ def template(
         "use_cache": settings.use_cache,
     }
     with terminal.TerminalListener() as listen:
-        for remark in remarks_of_scene(scene_on_film, is_rendered=False):
+        for remark in pipeline.remarks_of_scene(scene_on_film, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
-            files = render_template(scene_on_film, output, progress=listen, **options)
+            files = pipeline.render_template(scene_on_film, output, progress=listen, **options)
         else:
-            files = [output, render_look(scene_on_film, output, progress=listen, **options)]
+            files = [
+                output,
+                pipeline.render_look(scene_on_film, output, progress=listen, **options),
+            ]
     return _show_template(output, files)
 
 
 def _template_of_basis(
-    source: BasisFile | GroupsFile,
+    source: pipeline.BasisFile | pipeline.GroupsFile,
     output: Path,
     transform: ViewTransform | None,
-    settings: Settings,
+    settings: pipeline.Settings,
 ) -> CommandOutcome:
     """Write a template of a saved basis or of light groups."""
-    check_nothing_unused(settings, source)
+    pipeline.check_nothing_unused(settings, source)
     content = source.content
     basis = content if isinstance(content, Basis) else content.basis
     check_files(
@@ -354,9 +333,9 @@ def _template_of_basis(
         for remark in content.remarks:
             terminal.say(remark)
     if is_folder(output):
-        files = template_of_basis(basis, output, transform=transform)
+        files = pipeline.template_of_basis(basis, output, transform=transform)
     else:
-        files = [output, look_of_basis(basis, output, transform=transform)]
+        files = [output, pipeline.look_of_basis(basis, output, transform=transform)]
     return _show_template(output, files, is_denoised=basis.knows_noise)
 
 
@@ -397,7 +376,7 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
     return lines
 
 
-def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOutcome:
+def demo(*, folder: Path, variant: str | None, settings: pipeline.Settings) -> CommandOutcome:
     """Run `lightpaint demo -o DIR`."""
     demo_files = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
@@ -408,10 +387,12 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOut
         f"wrote a gallery and a painting of it in the evening to {folder}; this solves for it:"
     )
     terminal.say(command)
-    scene = SceneFile(str(demo_files.scene), variant=variant)
+    scene = pipeline.SceneFile(str(demo_files.scene), variant=variant)
     settings = replace(settings, command=from_any_folder(command))
-    painting = Painting(str(demo_files.painting))
-    outcome = solve(jobs=[Job((scene,), (painting,), demo_files.answer, settings=settings)])
+    painting = pipeline.Painting(str(demo_files.painting))
+    outcome = solve(
+        jobs=[pipeline.Job((scene,), (painting,), demo_files.answer, settings=settings)]
+    )
     terminal.write("")
     terminal.write(f"Open {demo_files.answer / 'report.html'} in a browser. Then paint your own:")
     terminal.write(f"lightpaint template {shlex.quote(str(demo_files.scene))}")
@@ -425,7 +406,11 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOut
 
 
 def relight(
-    *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
+    *,
+    scene: pipeline.SceneFile,
+    lightings: Sequence[Path],
+    output: Path | None,
+    settings: pipeline.Settings,
 ) -> CommandOutcome:
     """Run `lightpaint relight SCENE lighting.json...`."""
     for path in lightings:
@@ -435,7 +420,7 @@ def relight(
     folders = folders_of(output, names)
     scene_on_film = _loaded(scene)
     results = [
-        relit_folder(scene_on_film, path, folder, force=settings.force)
+        pipeline.relit_folder(scene_on_film, path, folder, force=settings.force)
         for path, folder in zip(lightings, folders, strict=True)
     ]
     for place in results:
@@ -446,7 +431,7 @@ def relight(
             terminal.say(f"{folder}: the lighting was solved for an earlier state of the scene")
         with terminal.TerminalListener() as listen:
             options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            relight_look({"": scene_on_film}, lighting, place, progress=listen, **options)
+            pipeline.relight_look({"": scene_on_film}, lighting, place, progress=listen, **options)
             listen.note(f"{folder} relit and rendered")
         camera = lighting.observer
         seen = f", as {camera.name} sees the scene" if camera.is_camera else ""
@@ -456,20 +441,24 @@ def relight(
     )
 
 
-def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
+def _relit(lighting: Path, place: pipeline.ResultFolder) -> dict[str, Any]:
     """Return the files of a relit scene, for programs."""
     files = [file for file in place.files if file.is_file()]
     return documents.files_document(place.folder, files, lighting=str(lighting))
 
 
-def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> CommandOutcome:
+def verify(
+    *, folders: Sequence[Path], variant: str | None, settings: pipeline.Settings
+) -> CommandOutcome:
     """Run `lightpaint verify DIR...`."""
     use_variant(variant)
     results = []
-    for folder in (view for folder_given in folders for view in result_folders(folder_given)):
+    for folder in (
+        view for folder_given in folders for view in pipeline.result_folders(folder_given)
+    ):
         with terminal.TerminalListener() as listen:
             options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            result = verify_result(folder, progress=listen, **options)
+            result = pipeline.verify_result(folder, progress=listen, **options)
             listen.note(f"{folder} rendered and compared")
         terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
         results.append((folder, result))
@@ -512,7 +501,7 @@ def _replaced_files(output: Path) -> list[Path]:
     return files_in_the_way(output)
 
 
-def _loaded(scene: SceneFile) -> Scene:
+def _loaded(scene: pipeline.SceneFile) -> Scene:
     """Return the scene, without remarks on single lights."""
     scene_on_film = scene.content
     note_scene(scene_on_film)

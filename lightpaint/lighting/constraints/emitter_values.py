@@ -7,23 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from lightpaint import colour
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis import BasisLight
-from lightpaint.colour import (
-    MAX_EMITTERS,
-    MAX_SLOTS,
-    REC709,
-    LampEmitter,
-    SlotFilter,
-    Spectrum,
-    luminance,
-    matching_functions,
-    measured_points,
-    named_spectrum,
-    photometry,
-    rgb_to_xyz,
-    spectrum_of,
-)
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys
@@ -59,9 +45,9 @@ class EmitterRequest:
     bits: int
     watts: float | None
     where: SourceKey
-    spectrum: Spectrum | None = None
+    spectrum: colour.Spectrum | None = None
 
-    def in_light(self, light: BasisLight, cd_per_unit: float | None) -> LampEmitter:
+    def in_light(self, light: BasisLight, cd_per_unit: float | None) -> colour.LampEmitter:
         """Return the emitter with its emission in the unit of a light.
 
         cd_per_unit: cd/m² of a radiance of 1. Raises ConstraintError if candelas or lumens say
@@ -74,7 +60,9 @@ class EmitterRequest:
             level *= count / self._amount_of_one(light, cd_per_unit)
         emission = as_rgb(level * np.array(self.color))
         watts = None if self.watts is None else count * self.watts
-        return LampEmitter(self.name, emission, self.most, self.bits, watts, spectrum=self.spectrum)
+        return colour.LampEmitter(
+            self.name, emission, self.most, self.bits, watts, spectrum=self.spectrum
+        )
 
     def _amount_of_one(self, light: BasisLight, cd_per_unit: float | None) -> float:
         """Return the candelas or lumens of an emission of luminance 1."""
@@ -86,7 +74,7 @@ class EmitterRequest:
                 Hint("cd_per_unit"),
                 ", or give Y in the scene's unit",
             )
-        white = photometry(
+        white = colour.photometry(
             (1, 1, 1), unit=light.unit, unit_flux=light.unit_flux, cd_per_unit=cd_per_unit
         )
         found = white.flux_lm
@@ -116,7 +104,7 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
             '[{name = "red", xy = [0.69, 0.31], cd = 900}]',
         )
     is_wheel = bool(table.get("wheel")) and not has_slots(table)
-    if len(value) > (most := MAX_SLOTS if is_wheel else MAX_EMITTERS):
+    if len(value) > (most := colour.MAX_SLOTS if is_wheel else colour.MAX_EMITTERS):
         kind, what = ("slots", "be on a wheel") if is_wheel else ("emitters", "be mixed")
         raise ConstraintError(where, f" lists {len(value)} {kind}: at most {most} can {what}")
     emitters = tuple(_parse_emitter(x, where / str(k + 1)) for k, x in enumerate(value))
@@ -129,16 +117,16 @@ def has_slots(table: Mapping[str, Any]) -> bool:
     return isinstance(table.get("wheel"), list | tuple)
 
 
-def parse_slots(table: Mapping[str, Any], light: SourceKey) -> tuple[SlotFilter, ...]:
+def parse_slots(table: Mapping[str, Any], light: SourceKey) -> tuple[colour.SlotFilter, ...]:
     """Return the slots of a wheel in front of emitters, none without one. Raises
     ConstraintError."""
     if not has_slots(table):
         return ()
     value, where = table["wheel"], light / "wheel"
-    if not 0 < len(value) <= MAX_SLOTS or not all(isinstance(x, Mapping) for x in value):
+    if not 0 < len(value) <= colour.MAX_SLOTS or not all(isinstance(x, Mapping) for x in value):
         raise ConstraintError(
             where,
-            f" is {one_line(repr(value))}: expected a list of at most {MAX_SLOTS} slots, "
+            f" is {one_line(repr(value))}: expected a list of at most {colour.MAX_SLOTS} slots, "
             '[{name = "congo", transmission = [0.1, 0.02, 0.6]}]',
         )
     slots = tuple(_parse_slot(x, where / str(k + 1)) for k, x in enumerate(value))
@@ -154,7 +142,7 @@ def _check_names(names: Sequence[str], kind: str, where: SourceKey) -> None:
         )
 
 
-def _parse_slot(table: Mapping[str, Any], where: SourceKey) -> SlotFilter:
+def _parse_slot(table: Mapping[str, Any], where: SourceKey) -> colour.SlotFilter:
     check_keys(table, SLOT_KEYS, where)
     name, passed = table.get("name"), table.get("transmission")
     if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME:
@@ -166,7 +154,7 @@ def _parse_slot(table: Mapping[str, Any], where: SourceKey) -> SlotFilter:
             f" is {one_line(repr(passed))}: expected the shares of red, green and blue of BT.2020 "
             "that it lets through, [0.1, 0.02, 0.6]",
         )
-    return SlotFilter(name.strip(), as_rgb(np.array(passed, np.float64)))
+    return colour.SlotFilter(name.strip(), as_rgb(np.array(passed, np.float64)))
 
 
 def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest:
@@ -188,7 +176,7 @@ def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest
         color, spectrum = _parse_spectrum(table[key], where / key)
     else:
         color = _parse_color(key, table[key], where / key)
-    size = float(luminance(color))
+    size = float(colour.luminance(color))
     if not amounts and key != "rgb":
         raise ConstraintError(
             where,
@@ -229,7 +217,7 @@ def _parse_color(key: str, value: Any, where: SourceKey) -> Doubles:
             raise ConstraintError(where, f" is {list(numbers)}: no colour has this x and y")
         return _of_xyz(np.array([x / y, 1, (1 - x - y) / y]))
     color = np.array(numbers, np.float64)
-    if luminance(color) <= 0:
+    if colour.luminance(color) <= 0:
         raise ConstraintError(
             where, f" is {list(numbers)}, whose luminance is not above 0: no light has this colour"
         )
@@ -237,10 +225,10 @@ def _parse_color(key: str, value: Any, where: SourceKey) -> Doubles:
 
 
 def _of_xyz(xyz: Doubles) -> Doubles:
-    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), xyz))
+    return np.asarray(np.linalg.solve(colour.rgb_to_xyz(colour.REC709), xyz))
 
 
-def _parse_spectrum(value: Any, where: SourceKey) -> tuple[Doubles, Spectrum]:
+def _parse_spectrum(value: Any, where: SourceKey) -> tuple[Doubles, colour.Spectrum]:
     """Return the colour of a spectrum under the CIE's standard observer of 1931, of luminance 1,
     and the spectrum.
 
@@ -251,13 +239,13 @@ def _parse_spectrum(value: Any, where: SourceKey) -> tuple[Doubles, Spectrum]:
         if isinstance(value, str):
             is_file = where.source.endswith(".toml")
             folder = Path(where.source).parent if is_file else Path()
-            waves, powers = named_spectrum(value, folder)
+            waves, powers = colour.named_spectrum(value, folder)
         else:
             waves, powers = _pairs(value, where)
         # Between its points a spectrum is straight, and dark beyond them.
-        metres, observer = matching_functions()
+        metres, observer = colour.matching_functions()
         xyz = np.interp(metres * 1e9, waves, powers, left=0, right=0) @ observer
-        return _of_xyz(xyz / max(xyz[1], 1e-300)), spectrum_of(waves, powers)
+        return _of_xyz(xyz / max(xyz[1], 1e-300)), colour.spectrum_of(waves, powers)
     except ColorError as error:
         raise ConstraintError(where, ": " if isinstance(value, str) else " ", error) from None
 
@@ -280,5 +268,5 @@ def _pairs(value: Any, where: SourceKey) -> tuple[Doubles, Doubles]:
             "[632, 1], [644, 0.1], [700, 0]]; or the name of a file or a light, "
             '"led.csv", "spot.gdtf:Red", "3200K blackbody"',
         )
-    waves, powers = measured_points(pairs)
+    waves, powers = colour.measured_points(pairs)
     return waves, powers[:, 0]

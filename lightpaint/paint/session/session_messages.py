@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import report
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis import Basis, BasisLight
 from lightpaint.colour import (
@@ -54,33 +55,6 @@ from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.history_steps import Region
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.report import (
-    ALONE_ADVICE,
-    NO_CLOSER_TEXT,
-    NO_ERROR,
-    bound_sentences,
-    compensation_sentences,
-    headline,
-    hold_clause,
-    is_one_painting,
-    named_worst_wish,
-    spoken_amount,
-    spoken_came,
-    spoken_changed,
-    spoken_elsewhere,
-    spoken_errors,
-    spoken_lack,
-    spoken_mean_shares,
-    spoken_missing,
-    spoken_newest,
-    spoken_on_the_whole,
-    spoken_part,
-    spoken_percent,
-    spoken_place,
-    spoken_reason,
-    spoken_shares,
-    spoken_whole,
-)
 
 #: Part of the current light under which one is off.
 OFF = 1e-4
@@ -95,7 +69,7 @@ WORSE_TEXT = "Farther from the paint than the current lighting, which undo bring
 ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more or loosen the hold.",
     "colors": "The settings allow any colour.",
-    "light": ALONE_ADVICE,
+    "light": report.ALONE_ADVICE,
 }
 
 #: How to allow any colour: in the painter it is a setting, not an argument.
@@ -256,7 +230,7 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     error, of those that lack a wish if there are any.
     """
     solution = analyses[0].solution
-    errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
+    errors = report.spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings, renderings = solution.lighting.lights, _renderings(solution.lighting)
     by_view = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
     return Judgement(
@@ -350,17 +324,19 @@ def sketch_headline(appearance: Appearance) -> str:
     on unpainted parts.
     """
     if appearance.is_close:
-        return headline(appearance)
+        return report.headline(appearance)
     phrase = _progress_phrase(appearance)
-    if (wish := named_worst_wish(appearance)) is not None:
+    if (wish := report.named_worst_wish(appearance)) is not None:
         return _wish_text(appearance, wish, phrase)
     if appearance.place is None:
         return f"{phrase}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one appears once this is resolved.
     first = replace(appearance, reasons=appearance.causes[:1])
-    missing = spoken_missing(appearance)
-    text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
-    newest = "" if is_one_painting(appearance.deliveries) else spoken_newest(appearance)
+    missing = report.spoken_missing(appearance)
+    text = f"{missing[0].upper()}{missing[1:]} is missing: {report.spoken_reason(first)}."
+    newest = (
+        "" if report.is_one_painting(appearance.deliveries) else report.spoken_newest(appearance)
+    )
     if len(main_deliveries(appearance.deliveries)) == 1:  # which the phrase is about
         newest = ""
     return " ".join(filter(None, [f"{phrase}.", text, _advice_text(appearance), newest]))
@@ -374,16 +350,16 @@ def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
     """
     first = replace(appearance, reasons=appearance.causes[:1])
     is_warning = appearance.is_worse or appearance.is_at_cost
-    lack = spoken_lack(first, wish)
+    lack = report.spoken_lack(first, wish)
     sentences = [lack, _advice_text(appearance) if appearance.causes else ""]
-    if is_one_painting(appearance.deliveries):
-        sentences.insert(0, f"{phrase}." if is_warning else spoken_whole(appearance))
+    if report.is_one_painting(appearance.deliveries):
+        sentences.insert(0, f"{phrase}." if is_warning else report.spoken_whole(appearance))
     elif is_warning:
-        sentences = [f"{phrase}.", *sentences, spoken_newest(appearance)]
+        sentences = [f"{phrase}.", *sentences, report.spoken_newest(appearance)]
     else:
         rest = appearance.unpainted_change if appearance.changes_unpainted else None
-        whole = spoken_on_the_whole(appearance)
-        sentences += [spoken_newest(appearance), whole, spoken_elsewhere(rest)]
+        whole = report.spoken_on_the_whole(appearance)
+        sentences += [report.spoken_newest(appearance), whole, report.spoken_elsewhere(rest)]
     return " ".join(filter(None, sentences))
 
 
@@ -399,15 +375,15 @@ def _progress_phrase(appearance: Appearance) -> str:
     There is no praise if the rest has changed by more than the paint has come closer.
     """
     rest = appearance.unpainted_change if appearance.changes_unpainted else None
-    phrase = spoken_came(appearance)
-    if phrase == NO_CLOSER_TEXT:
+    phrase = report.spoken_came(appearance)
+    if phrase == report.NO_CLOSER_TEXT:
         phrase = WORSE_TEXT if appearance.is_worse else phrase
     elif rest is not None and appearance.is_at_cost:
-        cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
-        shares = spoken_mean_shares(appearance.deliveries)
-        came = shares or f"{spoken_percent(appearance.progress)} of the way"
+        cost = f"{report.spoken_part(rest)} (ΔE {report.spoken_amount(rest.worst)})"
+        shares = report.spoken_mean_shares(appearance.deliveries)
+        came = shares or f"{report.spoken_percent(appearance.progress)} of the way"
         return f"{came[0].upper()}{came[1:]}, at the cost of {cost}"
-    return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
+    return phrase if rest is None else f"{phrase}, and changes {report.spoken_changed(rest)}"
 
 
 def why_not_closer(analysis: Analysis) -> list[str]:
@@ -416,18 +392,18 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     `sketch_headline`, below the pictures, has the place of the largest error.
     """
     appearance, diagnosis = analysis.appearance, analysis.diagnosis
-    if not (parts := spoken_shares(diagnosis)):
-        return [NO_ERROR]
+    if not (parts := report.spoken_shares(diagnosis)):
+        return [report.NO_ERROR]
     problem = analysis.solution.problem
     words = MISS_TEXTS | (
         CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
-    words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(appearance)}
+    words |= {"unreachable": MISS_TEXTS["unreachable"] + report.hold_clause(appearance)}
     shares = [f"{share} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of the difference (large errors count most), {', '.join(shares)}."]
     if appearance.place is None and diagnosis.place is not None:
-        sentences.append(spoken_place(diagnosis.place))
-    return sentences + bound_sentences(diagnosis, appearance, any_color=ANY_COLOR_TEXT)
+        sentences.append(report.spoken_place(diagnosis.place))
+    return sentences + report.bound_sentences(diagnosis, appearance, any_color=ANY_COLOR_TEXT)
 
 
 def removable_reason(appearance: Appearance) -> Reason | None:
@@ -477,9 +453,9 @@ def _closeness(analysis: Analysis) -> Closeness:
     """Return how close one view is, and why not closer."""
     appearance = analysis.appearance
     if appearance.is_close:
-        sentences = compensation_sentences(appearance.compensating_lights)
+        sentences = report.compensation_sentences(appearance.compensating_lights)
     else:
-        sentences = bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)
+        sentences = report.bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)
     return Closeness(
         headline=sketch_headline(appearance),
         help=advice(appearance),
@@ -500,13 +476,13 @@ def preview_text(
     """
     now, then = delta_e
     if round(then, 1) < round(now, 1):
-        before, after = spoken_amount(now), spoken_amount(then)
+        before, after = report.spoken_amount(now), report.spoken_amount(then)
         text = f"Comes closer to the paint (mean ΔE {after} instead of {before})"
     else:
         text = "The answer comes no closer"
     if rest is None or rest.worst < INVISIBLE:
         return f"{text}.", False
-    text = f"{text}, and changes {spoken_changed(rest)}."
+    text = f"{text}, and changes {report.spoken_changed(rest)}."
     more = " That is more than it gains." if is_at_cost else ""
     return text + more, is_at_cost
 

@@ -7,26 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint import lighting
 from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.colour import ViewTransform
-from lightpaint.lighting import (
-    NOTICED,
-    Colors,
-    Constraints,
-    Lighting,
-    PaintComparison,
-    Problem,
-    Solution,
-    analyse,
-    change_from_scene,
-    choose_mixes,
-    constraints_of,
-    correct_noise,
-    reduce_lights,
-    solution_of,
-    unpainted_change,
-)
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests
@@ -47,7 +31,7 @@ class SessionSnapshot:
     targets: tuple[Target | None, ...]
     requests: SessionRequests
     settings: Settings
-    constraints: Constraints
+    constraints: lighting.Constraints
     transform: ViewTransform
 
     @property
@@ -74,40 +58,40 @@ class SessionSnapshot:
             return ("",)
         return tuple(self.bases[k].origin.sensor for k in self.painted_views)
 
-    def lighting_of(self, weights: Doubles) -> Lighting:
+    def lighting_of(self, weights: Doubles) -> lighting.Lighting:
         """Return the lighting of weights (n, 3), with what mixes each light."""
         basis = self.bases[0]
-        every = constraints_of(basis.requests).and_then(self.constraints)
-        lamps = reduce_lights(every, basis.lights, self.settings).lamps
-        return Lighting.of_weights(basis, weights, lamps=lamps)
+        every = lighting.constraints_of(basis.requests).and_then(self.constraints)
+        lamps = lighting.reduce_lights(every, basis.lights, self.settings).lamps
+        return lighting.Lighting.of_weights(basis, weights, lamps=lamps)
 
-    def solution(self) -> Solution | None:
+    def solution(self) -> lighting.Solution | None:
         """Return the exact answer; None if nothing is painted. Raises LightpaintError."""
         return self._exact_solution(self.settings) if self.painted_views else None
 
-    def solution_with(self, colors: Colors) -> Solution:
+    def solution_with(self, colors: lighting.Colors) -> lighting.Solution:
         """Return the exact answer with another choice of light colours, of a painted session.
 
         Raises ConstraintError if a constraint excludes it.
         """
         return self._exact_solution(replace(self.settings, colors=colors))
 
-    def _exact_solution(self, settings: Settings) -> Solution:
-        solution = solution_of(self._problem(constraints=self.constraints, fit=settings))
+    def _exact_solution(self, settings: Settings) -> lighting.Solution:
+        solution = lighting.solution_of(self._problem(constraints=self.constraints, fit=settings))
         if settings.corrects_noise(is_known=self.bases[0].knows_noise):
-            solution = correct_noise(solution)
-        return choose_mixes(solution)
+            solution = lighting.correct_noise(solution)
+        return lighting.choose_mixes(solution)
 
-    def _problem(self, **options: Any) -> Problem:
-        return Problem.of(
+    def _problem(self, **options: Any) -> lighting.Problem:
+        return lighting.Problem.of(
             [self.bases[k] for k in self.painted_views], self.painted_targets, **options
         )
 
-    def delta_e(self, solution: Solution) -> float:
+    def delta_e(self, solution: lighting.Solution) -> float:
         """Return the mean ΔE between the paint and an answer to it, over the painted views."""
         differences = []
         for k, answer in zip(self.painted_views, solution.views, strict=True):
-            look = PaintComparison.of_problem(answer.problem)
+            look = lighting.PaintComparison.of_problem(answer.problem)
             picture = look.pixels(self.bases[k].mix(solution.weights))
             differences.append(float(look.mean(look.difference(picture))))
         return mean(differences)
@@ -124,8 +108,10 @@ class SessionSnapshot:
             return ["Nothing is painted here yet."], blank
         solution = self.solution()
         assert solution is not None
-        analysis = analyse(solution)[self.painted_views.index(view)]
-        best = solution_of(self._problem(fit=replace(self.settings, hold=0.0, colors="free")))
+        analysis = lighting.analyse(solution)[self.painted_views.index(view)]
+        best = lighting.solution_of(
+            self._problem(fit=replace(self.settings, hold=0.0, colors="free"))
+        )
         transform = best.problem.fit.transform or ViewTransform()
         predicted = transform.encode(self.bases[view].mix(best.weights))
         missed = np.abs(predicted - transform.encode(target.image)).max(axis=-1)
@@ -151,13 +137,15 @@ class SessionSnapshot:
         judged_view = view if view in self.painted_views else self.painted_views[0]
         view_solution = solution.views[self.painted_views.index(judged_view)]
         basis, [target] = self.bases[judged_view], view_solution.problem.views.targets
-        look = PaintComparison.of_problem(view_solution.problem)
+        look = lighting.PaintComparison.of_problem(view_solution.problem)
         pictures = [basis.mix(x) for x in (weights, answer_weights)]
         now, then = (look.mean(look.difference(look.pixels(picture))) for picture in pictures)
         # As the sentence after the change will have it: from the current scene.
-        rest = change_from_scene(view_solution, look, answer_weights, pictures[1])
-        caused = unpainted_change(look, basis, target.importance > 0, *pictures)
-        is_at_cost = caused is not None and caused.worst > NOTICED and caused.delta_e > now - then
+        rest = lighting.change_from_scene(view_solution, look, answer_weights, pictures[1])
+        caused = lighting.unpainted_change(look, basis, target.importance > 0, *pictures)
+        is_at_cost = (
+            caused is not None and caused.worst > lighting.NOTICED and caused.delta_e > now - then
+        )
         text = preview_text((now, then), rest, is_at_cost=is_at_cost)
         return ChangePreview(before, afterwards, *text)
 

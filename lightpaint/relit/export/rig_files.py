@@ -20,24 +20,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
+from lightpaint import dmx
 from lightpaint.arrays import Doubles, Position
 from lightpaint.colour import REC709, luminance, rgb_to_xyz
-from lightpaint.dmx import (
-    DESCRIPTION,
-    KIND,
-    MM,
-    ConsoleRig,
-    DmxChannel,
-    NamedFixture,
-    RigDrives,
-    RigFixture,
-    RigLight,
-    aimed_rig,
-    check_drives,
-    encode_levels,
-    named_fixtures,
-    show_nodes,
-)
 from lightpaint.lighting import Lighting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.scene.properties.site import EmitterPlace, rotation_between
@@ -89,7 +74,7 @@ class LevelRow:
 DIMMER, KELVIN, WHEEL = "dimmer", "kelvin", "wheel"
 
 
-def light_channels(light: RigLight) -> list[tuple[str, int]]:
+def light_channels(light: dmx.RigLight) -> list[tuple[str, int]]:
     """Return what a light sets, and the place of the channel among the channels of its fixture."""
     if not light.is_controlled:
         return []
@@ -103,19 +88,21 @@ def light_channels(light: RigLight) -> list[tuple[str, int]]:
     ]
 
 
-def level_rows(rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]) -> list[LevelRow]:
+def level_rows(
+    rig: dmx.ConsoleRig, drives: dmx.RigDrives, universes: Mapping[int, int]
+) -> list[LevelRow]:
     """Return a row for each channel that drives set. universes: of the network by the universes of
     the rig.
 
     All other channels of a fixture are at rest.
     """
-    levels = encode_levels(rig, drives)
+    levels = dmx.encode_levels(rig, drives)
     return [row for fixture in rig.fixtures for row in _rows(fixture, drives, levels, universes)]
 
 
 def _rows(
-    fixture: RigFixture,
-    drives: RigDrives,
+    fixture: dmx.RigFixture,
+    drives: dmx.RigDrives,
     levels: Mapping[int, bytes],
     universes: Mapping[int, int],
 ) -> Iterator[LevelRow]:
@@ -133,14 +120,14 @@ def _rows(
             yield LevelRow(*named, name, None, *_setting(fixture, k, levels, universes))
 
 
-def _aim_channels(fixture: RigFixture, light: RigLight) -> list[tuple[str, int]]:
+def _aim_channels(fixture: dmx.RigFixture, light: dmx.RigLight) -> list[tuple[str, int]]:
     """Return pan and tilt of the head of which a light is the first one, if it is aimed."""
     heads = [x for x in fixture.heads if fixture.is_aimed and x.lights[0] == light.name]
     return [(axis.name, axis.channel) for head in heads for axis in head.axes]
 
 
 def _setting(
-    fixture: RigFixture, place: int, levels: Mapping[int, bytes], universes: Mapping[int, int]
+    fixture: dmx.RigFixture, place: int, levels: Mapping[int, bytes], universes: Mapping[int, int]
 ) -> tuple[int, tuple[int, ...], int]:
     """Return universe, channels and value of a row."""
     channel = fixture.channels[place]
@@ -149,7 +136,9 @@ def _setting(
     return universes[where[0][0]], numbers, channel_level(fixture, channel, levels)
 
 
-def channel_level(fixture: RigFixture, channel: DmxChannel, levels: Mapping[int, bytes]) -> int:
+def channel_level(
+    fixture: dmx.RigFixture, channel: dmx.DmxChannel, levels: Mapping[int, bytes]
+) -> int:
     """Return the level of a channel, of all its bytes, in levels of the rig's universes."""
     values = [levels[universe][index] for universe, index in fixture.places(channel)]
     return int.from_bytes(bytes(values), "big")
@@ -165,10 +154,10 @@ def level_csv(rows: list[LevelRow]) -> str:
 
 
 def level_document(
-    rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]
+    rig: dmx.ConsoleRig, drives: dmx.RigDrives, universes: Mapping[int, int]
 ) -> dict[str, Any]:
     """Return the rows and all 512 levels of each universe as plain values."""
-    levels = encode_levels(rig, drives)
+    levels = dmx.encode_levels(rig, drives)
     names = [field.name for field in fields(LevelRow)]
     rows = level_rows(rig, drives, universes)
     return {
@@ -180,7 +169,7 @@ def level_document(
     }
 
 
-def level_json(rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]) -> str:
+def level_json(rig: dmx.ConsoleRig, drives: dmx.RigDrives, universes: Mapping[int, int]) -> str:
     """Return the document as text."""
     document = level_document(rig, drives, universes)
     return json.dumps(document, ensure_ascii=False, allow_nan=False, indent=2) + "\n"
@@ -208,11 +197,11 @@ class Cue:
 
     label: str
     fade_s: float
-    drives: RigDrives
+    drives: dmx.RigDrives
     directions: Mapping[str, Position] | None = None
 
 
-def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
+def cue_list_csv(rig: dmx.ConsoleRig, cues: Sequence[Cue]) -> str:
     """Return a table of cues, counted from 1, with all channels that give light, and with pan and
     tilt of cues that have directions.
 
@@ -225,11 +214,11 @@ def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
     table.writerow(COLUMNS)
     aimed = rig
     for number, cue in enumerate(cues, start=1):
-        check_drives(rig, cue.drives)
+        dmx.check_drives(rig, cue.drives)
         if cue.directions is not None:
             # From one cue to the next heads go the shortest way.
-            aimed, _ = aimed_rig(aimed, cue.directions)
-        levels = encode_levels(aimed, cue.drives)
+            aimed, _ = dmx.aimed_rig(aimed, cue.directions)
+        levels = dmx.encode_levels(aimed, cue.drives)
         for fixture in aimed.fixtures:
             names = _channel_names(fixture)
             for channel in _set_channels(fixture):
@@ -241,7 +230,7 @@ def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
     return text.getvalue()
 
 
-def _set_channels(fixture: RigFixture) -> list[DmxChannel]:
+def _set_channels(fixture: dmx.RigFixture) -> list[dmx.DmxChannel]:
     """Return the channels that a fixture's lights set, and axes that are aimed, in order."""
     used = {k for light in fixture.lights for _, k in light_channels(light)}
     if fixture.is_aimed:
@@ -249,7 +238,7 @@ def _set_channels(fixture: RigFixture) -> list[DmxChannel]:
     return [fixture.channels[k] for k in sorted(used)]
 
 
-def _channel_names(fixture: RigFixture) -> dict[DmxChannel, str]:
+def _channel_names(fixture: dmx.RigFixture) -> dict[dmx.DmxChannel, str]:
     counts = Counter(channel.attribute for channel in fixture.channels)
     return {
         channel: channel.attribute
@@ -275,10 +264,10 @@ def show_copy(path: Path, lighting: Lighting) -> ShowCopy:
     """
     emissions = _emissions(lighting)
     places = {x.name: x for x in lighting.places if x.moved_from is not None}
-    with RigArchive(path, path.name, KIND) as archive:
-        root = archive.xml(DESCRIPTION)
+    with RigArchive(path, path.name, dmx.KIND) as archive:
+        root = archive.xml(dmx.DESCRIPTION)
         with reading(path.name):
-            fixtures, _ = named_fixtures([*show_nodes(root)], path.name)
+            fixtures, _ = dmx.named_fixtures([*dmx.show_nodes(root)], path.name)
             taken: set[str] = set()
             colors: dict[str, Doubles] = {}
             for fixture in fixtures:
@@ -326,7 +315,7 @@ def _set_text(element: Element, tag: str, text: str) -> None:
     child.text = text
 
 
-def _move(fixture: NamedFixture, place: EmitterPlace) -> None:
+def _move(fixture: dmx.NamedFixture, place: EmitterPlace) -> None:
     """Move a fixture as its light has moved; what has a focus point gets a new one."""
     old, node = place.moved_from, fixture.node
     assert old is not None
@@ -356,7 +345,7 @@ def _move(fixture: NamedFixture, place: EmitterPlace) -> None:
 
 def _matrix_text(matrix: Doubles) -> str:
     """Return a matrix as MVR has it: rows are axes, the last one the place in millimetres."""
-    rows = [*matrix[:3, :3].T, MM * matrix[:3, 3]]
+    rows = [*matrix[:3, :3].T, dmx.MM * matrix[:3, 3]]
     return "".join(f"{{{','.join(f'{x:.9g}' for x in row)}}}" for row in rows)
 
 
@@ -367,6 +356,6 @@ def _packed(archive: RigArchive, description: bytes) -> bytes:
         for member in archive.members:
             own = copy(member)
             own.filename = archive.name_of(member)
-            is_description = member.filename == DESCRIPTION
+            is_description = member.filename == dmx.DESCRIPTION
             new.writestr(own, description if is_description else archive.read(member.filename))
     return buffer.getvalue()

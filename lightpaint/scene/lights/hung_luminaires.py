@@ -14,22 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import luminaires
 from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.luminaires import (
-    AREA_PLUGIN,
-    EMITTER_FROM_WEB,
-    LUMINAIRE_PLUGINS,
-    POINT_PLUGIN,
-    LuminaireRequest,
-    PhotometricWeb,
-    flux_remark,
-    hanging_frame,
-    spots_of,
-    unread_remark,
-    world_from_web,
-)
 from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import child_named
@@ -46,7 +34,7 @@ DIRECTIONS, LEAST_INTENSITY = 1024, 0.01
 THIN = 1e-3
 
 #: Emitters without a shape whose place a luminaire can take.
-_POINTS = ("point", "spot", POINT_PLUGIN)
+_POINTS = ("point", "spot", luminaires.POINT_PLUGIN)
 
 #: What follows the name of a luminaire in the names of further spots that form its light.
 SPOT_MARK = ".spot"
@@ -64,7 +52,7 @@ class HungLuminaire:
     """
 
     name: str
-    request: LuminaireRequest
+    request: luminaires.LuminaireRequest
     file: int
     offset: int
     scale: float
@@ -77,9 +65,9 @@ class HungLuminaire:
     def remarks(self) -> list[str]:
         """Return what its user should know of it."""
         web, file = self.request.web, self.request.path.name
-        opening, remarks = web.opening, [unread_remark(web, file)]
+        opening, remarks = web.opening, [luminaires.unread_remark(web, file)]
         if self.request.lumens is None:
-            remarks.append(flux_remark(web, file))
+            remarks.append(luminaires.flux_remark(web, file))
         elif self.request.has_absolute_emitters:
             remarks.append(
                 f"{file}: lumens changes nothing beside emitters in lm or cd, which say how bright "
@@ -101,7 +89,7 @@ class HungLuminaire:
 
 def hang_luminaires(
     parsed: ParsedScene,
-    requests: Mapping[str, LuminaireRequest],
+    requests: Mapping[str, luminaires.LuminaireRequest],
     groups: Mapping[str, Iterable[str]],
     up: Position,
     cd_per_unit: float,
@@ -167,11 +155,11 @@ def _copied(parsed: ParsedScene) -> ParsedScene:
 
 def _chosen(
     parsed: ParsedScene,
-    requests: Mapping[str, LuminaireRequest],
+    requests: Mapping[str, luminaires.LuminaireRequest],
     groups: Mapping[str, Iterable[str]],
-) -> dict[int, LuminaireRequest]:
+) -> dict[int, luminaires.LuminaireRequest]:
     """Return the luminaire of each node, which the last request for it describes."""
-    chosen: dict[int, LuminaireRequest] = {}
+    chosen: dict[int, luminaires.LuminaireRequest] = {}
     names = {name: node for node, name in parsed.names.items() if node in parsed.emitter_nodes}
     for pattern, request in sorted(requests.items(), key=lambda x: x[0] in names):
         wanted = [pattern] if pattern in names else [*groups.get(pattern, ()), pattern]
@@ -198,10 +186,10 @@ def _rejoin(props: Any, hung: HungLuminaire) -> None:
     """Make the first of a luminaire's spots a luminaire at their level, which the others leave."""
     import mitsuba as mi
 
-    spots = spots_of(hung.request.web)
+    spots = luminaires.spots_of(hung.request.web)
     first = hung.scale * spots[0].candela if spots else 1.0
     level = np.array(props.get("intensity", 0.0), float).ravel() / first
-    props.set_plugin_name(POINT_PLUGIN)
+    props.set_plugin_name(luminaires.POINT_PLUGIN)
     props["intensity"] = mi.ScalarColor3f(*np.broadcast_to(level, 3).tolist())
 
 
@@ -209,7 +197,7 @@ def _check_place(parsed: ParsedScene, node: int) -> None:
     """Raise SceneError unless a luminaire can take the place of an emitter."""
     props = parsed.state.nodes[node].props
     plugin, shape = str(props.plugin_name()), parsed.shape_plugin(node)
-    is_flat = plugin in ("area", AREA_PLUGIN) and shape in FLAT_SHAPES
+    is_flat = plugin in ("area", luminaires.AREA_PLUGIN) and shape in FLAT_SHAPES
     pictures = ("texture", "radiance")
     is_picture = any(child_named(parsed.state, node, x) is not None for x in pictures)
     if (is_flat or plugin in _POINTS) and not is_picture:
@@ -231,9 +219,9 @@ def _frame(parsed: ParsedScene, node: int, up: Position) -> tuple[Doubles, Doubl
     props = parsed.state.nodes[node].props
     if props.plugin_name() == "point":
         if "position" in props:
-            return hanging_frame(up), np.array(props["position"], np.float64).ravel()
+            return luminaires.hanging_frame(up), np.array(props["position"], np.float64).ravel()
         place = _matrix(props)[:3, 3] if "to_world" in props else np.zeros(3)
-        return hanging_frame(up), place
+        return luminaires.hanging_frame(up), place
     matrix = _matrix(props) if "to_world" in props else np.eye(4)
     return matrix[:3, :3], matrix[:3, 3]
 
@@ -249,7 +237,7 @@ def _become_luminaire(
     import mitsuba as mi
 
     props = parsed.state.nodes[node].props
-    was_luminaire = props.plugin_name() in LUMINAIRE_PLUGINS
+    was_luminaire = props.plugin_name() in luminaires.LUMINAIRE_PLUGINS
     intensity = _level(parsed, node)
     own = {key: float(props[key]) for key in ("turn", "tilt") if was_luminaire and key in props}
     if was_luminaire:
@@ -260,7 +248,9 @@ def _become_luminaire(
     for key in list(props):
         if key != "sampling_weight":
             del props[key]
-    props.set_plugin_name(AREA_PLUGIN if node in parsed.shape_of else POINT_PLUGIN)
+    props.set_plugin_name(
+        luminaires.AREA_PLUGIN if node in parsed.shape_of else luminaires.POINT_PLUGIN
+    )
     props["filename"] = file
     if node not in parsed.shape_of:
         props["to_world"] = mi.ScalarAffineTransform4d(matrix)
@@ -271,7 +261,7 @@ def _become_luminaire(
 
 def _has_own_level(parsed: ParsedScene, node: int) -> bool:
     """Return whether the scene says how bright a luminaire is, or that it is off."""
-    is_luminaire = parsed.state.nodes[node].props.plugin_name() in LUMINAIRE_PLUGINS
+    is_luminaire = parsed.state.nodes[node].props.plugin_name() in luminaires.LUMINAIRE_PLUGINS
     return is_luminaire or not any(_level(parsed, node))
 
 
@@ -284,13 +274,13 @@ def _level(parsed: ParsedScene, node: int) -> tuple[float, ...]:
     plain = (mi.Properties.Type.Color, mi.Properties.Type.Float)
     keys = [k for k in ("intensity", "radiance") if k in props and props.type(k) in plain]
     colors = [np.array(props[k], float).ravel() for k in keys]
-    if props.plugin_name() in LUMINAIRE_PLUGINS and colors:
+    if props.plugin_name() in luminaires.LUMINAIRE_PLUGINS and colors:
         return tuple(np.broadcast_to(colors[0], 3).tolist())
     return (0.0,) * 3 if colors and not colors[0].any() else (1.0,) * 3
 
 
 def _distances(
-    parsed: ParsedScene, chosen: Mapping[int, LuminaireRequest], up: Position
+    parsed: ParsedScene, chosen: Mapping[int, luminaires.LuminaireRequest], up: Position
 ) -> dict[int, float]:
     """Return the distance to the nearest surface that each luminaire of some size lights.
 
@@ -309,7 +299,7 @@ def _distances(
     with kernels():
         for node, request in sized.items():
             axes, place = _frame(parsed, node, up)
-            web_axes = world_from_web(axes, turn=request.turn, tilt=request.tilt)
+            web_axes = luminaires.world_from_web(axes, turn=request.turn, tilt=request.tilt)
             away = _lit_directions(request.web) @ web_axes.T
             rays = mi.Ray3f(
                 mi.Point3f(*place.tolist()), mi.Vector3f(away.T.astype(np.float32).copy())
@@ -319,15 +309,19 @@ def _distances(
     return found
 
 
-def _tilt(parsed: ParsedScene, node: int, request: LuminaireRequest, up: Position) -> float:
+def _tilt(
+    parsed: ParsedScene, node: int, request: luminaires.LuminaireRequest, up: Position
+) -> float:
     """Return the degrees by which the nadir of a luminaire is away from downwards."""
     props = parsed.state.nodes[node].props
     turn, tilt = (
-        float(props[key]) if props.plugin_name() in LUMINAIRE_PLUGINS and key in props else own
+        float(props[key])
+        if props.plugin_name() in luminaires.LUMINAIRE_PLUGINS and key in props
+        else own
         for key, own in (("turn", request.turn), ("tilt", request.tilt))
     )
     axes = _shape_axes(parsed, node) if node in parsed.shape_of else _frame(parsed, node, up)[0]
-    nadir = -world_from_web(axes, turn=turn, tilt=tilt)[:, 2]
+    nadir = -luminaires.world_from_web(axes, turn=turn, tilt=tilt)[:, 2]
     cosine = float(nadir @ up) / float(np.linalg.norm(up))
     return float(np.degrees(np.arccos(np.clip(-cosine, -1, 1))))
 
@@ -338,7 +332,7 @@ def _shape_axes(parsed: ParsedScene, node: int) -> Doubles:
     return _matrix(props)[:3, :3] if "to_world" in props else np.eye(3)
 
 
-def _lit_directions(web: PhotometricWeb) -> Doubles:
+def _lit_directions(web: luminaires.PhotometricWeb) -> Doubles:
     """Return directions (n, 3), evenly spread over those in which a web shines."""
     k = np.arange(DIRECTIONS) + 0.5
     z, angle = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
@@ -360,15 +354,15 @@ def _with_panel(
     axes, place = _frame(parsed, node, up)
     matrix = np.eye(4)
     # Its shape hangs as it is turned, so its light needs no turn.
-    in_world = world_from_web(axes, turn=request.turn, tilt=request.tilt)
+    in_world = luminaires.world_from_web(axes, turn=request.turn, tilt=request.tilt)
     opening = request.web.opening
     sides = np.maximum([opening.along_c0, opening.along_c90, 2 * THIN], THIN) / 2
-    matrix[:3, :3] = in_world @ EMITTER_FROM_WEB.T * [sides[0], sides[1], 1.0]
+    matrix[:3, :3] = in_world @ luminaires.EMITTER_FROM_WEB.T * [sides[0], sides[1], 1.0]
     matrix[:3, 3] = place
     is_disk = opening.is_round and abs(sides[0] - sides[1]) < THIN
     turned = {key: x for key, x in numbers.items() if key not in ("turn", "tilt")}
     lines = luminaire_lines(
-        AREA_PLUGIN,
+        luminaires.AREA_PLUGIN,
         "",
         file,
         turned,
