@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run, run_refused, succeed
+from texel_grid import texel_names
 
 import lightpaint as lp
 from lightpaint.basis.lights import Lights
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.report.visible_emitters import emitter_remarks
-from lightpaint.scene.lights.texels.texel import texel_names
 
 SIZE = (12, 10)
 TIMES = 350.0

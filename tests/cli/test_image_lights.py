@@ -8,11 +8,11 @@ import pytest
 from command import run, run_refused, succeed
 from PIL import Image
 from renderer import LIGHTS, write_room
+from texel_grid import texel_names
 
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
-from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.scene.properties.emission import read_emitted_image
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_reader import load_scene

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import BasisFactory
+from texel_grid import texel_names
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.light_basis import Basis
@@ -15,7 +16,7 @@ from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior
 from lightpaint.lighting.solver import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
-from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs, texel_names
+from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs
 from lightpaint.target.painted_target import Target
 
 FREE = Fit(colors="free")

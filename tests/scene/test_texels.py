@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from texel_grid import texel_direction, texel_names
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles, texel_direction
+from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles
 from lightpaint.scene.lights.texels.texel import (
     TexelLayout,
     image_of,
     images_of,
     parse_map_size,
     parse_size,
-    texel_names,
 )
 from lightpaint.scene.runtime.variant import use_variant
 

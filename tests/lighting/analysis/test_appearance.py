@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from texel_grid import texel_names
 
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -26,7 +27,6 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.report.verdict_sentences import headline
-from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (24, 48)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from axe import violations
 from painter_page import Painter
+from texel_grid import texel_direction
 
-from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles, texel_direction
+from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.errors import SceneError
 
 #: Columns and rows of an image.
@@ -182,15 +182,6 @@ class Sky(ImageDomain):
     def picture_size(self, size: GridSize, width: int) -> GridSize:
         """See ImageDomain: twice as wide as high, whatever the texels."""
         return width, width // 2
-
-
-def texel_direction(column: int, row: int, size: GridSize) -> Position:
-    """Return the direction from the scene to the centre of a texel, in the light's own space."""
-    columns, rows = size
-    azimuth = 2 * np.pi * (column + 0.5) / columns
-    polar = np.pi * row / (rows - 1)
-    x, z = np.sin(polar) * np.sin(azimuth), -np.sin(polar) * np.cos(azimuth)
-    return float(x), float(np.cos(polar)), float(z)
 
 
 def solid_angles(size: GridSize) -> Doubles:

@@ -378,12 +378,6 @@ def images_of(names: Iterable[str]) -> dict[str, GridSize]:
     return {image: layout.size for image, layout in layouts_of(names).items()}
 
 
-def texel_names(image: str, size: GridSize) -> list[str]:
-    """Return the names of all texels of an image, row by row."""
-    columns, rows = size
-    return [texel_name(image, x, y) for y in range(rows) for x in range(columns)]
-
-
 def mirrored_pairs(image: str, layout: TexelLayout) -> dict[str, list[str]]:
     """Return the texels of an image, row by row, by the name of the left one of each pair that are
     mirror images of each other; one in the middle is alone.
