@@ -188,8 +188,8 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
 
 
 def _split_scene(scene: Scene, lighting: Lighting, names: Collection[str]) -> Scene:
-    """Return `scene` with those lights split into texels of which `names`, of emitters of the
-    lighting, has all.
+    """Return `scene` with a light split into texels if `names`, of the lighting's emitters, has all
+    of these texels.
     """
     whole = {emitter.name for emitter in scene.emitters}
     sizes = {image: size for image, size in layouts_of(names).items() if image in whole}

@@ -240,8 +240,9 @@ def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
 def _with_colors_of_lamps(
     emitters: Sequence[Emitter], patterns: Sequence[str]
 ) -> tuple[Emitter, ...]:
-    """Return the emitters, of which those may be adjusted whose colour is outside Rec.709 and that
-    are lamps, as in a scene that was relit. patterns: names or patterns of lamps.
+    """Return the emitters, with lamps made adjustable whose colour is outside Rec.709.
+
+    A relit scene has such colours. patterns: names or patterns of lamps.
     """
 
     def is_lamp(emitter: Emitter) -> bool:

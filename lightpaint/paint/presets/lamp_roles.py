@@ -192,7 +192,7 @@ class LampRoles:
 
     @cached_property
     def even_daylight(self) -> Bools:
-        """(n,) lamps of the even light of a clouded sky; all of even light where none is such."""
+        """(n,) lamps with the even light of a clouded sky; without one, all with even light."""
         daylight = self.is_soft & self.is_daylight & self.counts
         return daylight if (daylight & ~self.is_wash).any() else self.is_soft
 

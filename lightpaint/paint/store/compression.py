@@ -200,7 +200,7 @@ def _unpack_parts(data: bytes, counts: Sequence[int]) -> list[npt.NDArray[np.uin
 
 
 def _unpacked(unpacking: Any, data: bytes, count: int, *, is_end: bool = False) -> bytes:
-    """Return the next bytes of a stream. Raises PaintError if there are fewer, but at its end."""
+    """Return the next bytes of a stream. Raises PaintError if there are fewer, unless `is_end`."""
     pieces: list[bytes] = []
     left = count
     try:

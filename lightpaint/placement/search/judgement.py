@@ -235,9 +235,9 @@ class PlacementJudge:
     def errors(self, best: Arrangement) -> ArrangementError:
         """Return the spread of poses between fits along independent paths.
 
-        All fits share the basis, whose noise moves poses, too. So the two others are to one half of
-        its samples each: of 0, d and -d, where d is the effect of the half difference, the variance
-        is d².
+        All fits share the basis, whose noise moves poses, too. So two fits more take one half of
+        the basis's samples each. They differ from the first by d and -d, the effect of the half
+        difference; the variance is d².
         """
         fits: list[Sequence[Site]] = [best.sites]
         for sign, other in ((1, self._paths.judge), (-1, self._paths.spread)):

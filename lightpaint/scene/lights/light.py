@@ -169,8 +169,7 @@ def keep(name: str, emitters: Sequence[Emitter]) -> Light:
 def lights_of(
     emitters: Sequence[Emitter], members: Mapping[str, Sequence[str]], fixed: Collection[str]
 ) -> tuple[Light, ...]:
-    """Return the lights `members` (name → names of its emitters), of which those in `fixed` are
-    fixed.
+    """Return the lights `members`, emitters by the name of their light; those in `fixed` are fixed.
 
     Raises SceneError if a light to adjust has an emitter that cannot be scaled.
     """

@@ -283,7 +283,7 @@ def rules_of(scene: Scene) -> Rules:
 
 
 def planes_by_emitter(scene: Scene) -> dict[str, int]:
-    """Return the plane of each loaded emitter, by its name; of an image one of its texels'."""
+    """Return the plane of each loaded emitter, by its name; for an image, the plane of a texel."""
     planes = dict(scene.plane_of)
     texels = {x.texel.image: planes[x.name] for x in scene.emitters if x.texel and x.name in planes}
     return planes | texels

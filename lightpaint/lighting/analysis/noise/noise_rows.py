@@ -99,7 +99,8 @@ def _signs(count: int) -> npt.NDArray[np.int8]:
 class NoiseSums:
     """Sums over some pixels, as in `Noise`.
 
-    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: of each channel.
+    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: the
+    pixels that decide, of each channel.
     """
 
     power: Doubles

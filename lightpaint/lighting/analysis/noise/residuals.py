@@ -173,7 +173,7 @@ def _neighbourhood_means(image: Doubles) -> Doubles:
 
 @dataclass(frozen=True)
 class PixelGradients:
-    """Half the negative gradient of the loss by the light of each pixel, at an answer.
+    """G, half the negative gradient of the loss by the light of each pixel, at an answer.
 
     mean: (p, 3), the tangent of G. half: (p, 3), half its difference between the two halves of the
     samples. bend: (p, 3), by how much G itself exceeds the tangent; None for squares, where G is
