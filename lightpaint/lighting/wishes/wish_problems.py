@@ -93,8 +93,8 @@ def _within_reach_of_lamps(problem: Problem, wished: WishedLight) -> RequiredPro
 
 
 def _price(equations: NormalEquations, reduction: Reduction) -> float:
-    """Return the price of a whole wish. A share of `SECOND` then counts as much as the largest
-    loss: a picture is black, or all lamps are at full, as far as that is bounded.
+    """Return the price of a whole wish: a share of `SECOND` then counts as much as the largest
+    loss, where a picture is black or all lamps are at full, as far as that is bounded.
     """
     black = float(equations.target_norm2.sum())
     _, high = reduction.weight_ranges
