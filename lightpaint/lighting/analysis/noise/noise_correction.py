@@ -17,7 +17,8 @@ sums of the basis, and reflections or caustics are kept once they are clean.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -37,6 +38,7 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.analysis.noise.weight_directions import free_directions, solve_for
 from lightpaint.lighting.joined_views import joint_basis
+from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
@@ -62,6 +64,9 @@ SAME_NOISE_SHARE = 1e-4
 
 #: Steps of the share of noise to remove from M.
 SHARE_STEPS = 8
+
+#: Largest number of pixels over which the loss without noise is compared.
+MAX_PIXELS = 2**16
 
 
 @keywords()
@@ -245,8 +250,8 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
 
     With many lights, the equations use light averaged along surfaces.
     A fit of blocks of pixels has already averaged most of the noise; its solution stays as it is.
-    If squares stand for another loss, the share is lowered until this loss falls, too: far from the
-    answer the squares do not represent it.
+    If squares stand for another loss, the share is halved as long as this loss falls, and is 0 if
+    it is least without correction: far from the answer the squares do not represent it.
 
     Args:
         solution: The solution to correct, where the solve starts.
@@ -282,16 +287,26 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     least = denoised_matrix(base, noise.power)
     if share is None:
         share = _best_share(solution, base, noise, least)
-    while share > 0:
+
+    def corrected_by(share: float) -> Solution:
         M, b = (1 - share) * base.M + share * least, base.b - share * noise.target_noise
-        corrected = _solved(solution, NormalEquations(M, b, e.target_norm2), share)
-        subtracted = NormalEquations(e.M - M, e.b - b, np.zeros(3))
-        if solution.problem.is_linear or _loss(corrected, subtracted) <= _loss(
-            solution, subtracted
-        ):
-            return corrected
-        share = share / 2 if share > 1 / SHARE_STEPS else 0.0
-    return _solved(solution, e, 0.0)
+        return _solved(solution, NormalEquations(M, b, e.target_norm2), share)
+
+    if solution.problem.is_linear and share > 0:
+        return corrected_by(share)
+    nearest = _solved(solution, e, 0.0)
+    if share == 0:
+        return nearest
+    loss = NoiselessLoss.of(solution)
+    least_loss, last_loss = loss.at(solution.weights), np.inf
+    for halvings in range(SHARE_STEPS.bit_length()):
+        corrected = corrected_by(share / 2**halvings)
+        if (reached := loss.at(corrected.weights)) > last_loss:
+            break
+        if reached <= least_loss:
+            nearest, least_loss = corrected, reached
+        last_loss = reached
+    return nearest
 
 
 def _solved(solution: Solution, corrected: NormalEquations, share: float) -> Solution:
@@ -306,15 +321,53 @@ def _has_noise_of_target(solution: Solution, noise: Noise) -> bool:
     return bool(objective < SAME_NOISE_SHARE * noise.objective_noise.sum())
 
 
-def _loss(solution: Solution, removed: NormalEquations) -> float:
-    """Return the error of a solution with its pull, less the removed noise."""
-    pull, weights = solution.problem.pull, solution.weights
-    pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
-    # As `NormalEquations.objective`, which would not allow a negative result.
-    noise = (
-        np.einsum("ic,cij,jc->", weights, removed.M, weights) - 2 * (removed.b.T * weights).sum()
-    )
-    return sum(solution.certificate.objective) + pulled - float(noise)
+@dataclass(frozen=True)
+class NoiselessLoss:
+    """The loss of a problem and its pull, without what the noise of the basis adds to it.
+
+    Noise of the light x and of the look C adds to a bent loss what as much noise again would: the
+    extrapolation of Cook and Stefanski (1994). With the half differences ν of both,
+
+        F(x, C) − (½ Σ± F(x ± ν_x, C ± ν_C) − F(x, C)).
+
+    lit: of the compared pixels; noise: of these, the half differences of the lights. look,
+    look_noise: (3, p). pull: of the weights; None without any.
+    """
+
+    lit: LitPixels
+    noise: LitPixels
+    look: Doubles
+    look_noise: Doubles
+    pull: NormalEquations | None
+
+    @classmethod
+    def of(cls, solution: Solution) -> Self:
+        """Choose the pixels of a problem whose loss is not linear, `MAX_PIXELS` or fewer."""
+        basis, problem = solution.basis, solution.problem
+        counted = np.flatnonzero(problem.loss.importance)
+        chosen = counted[:: -(-counted.size // MAX_PIXELS)]
+        scale = np.full(chosen.size, counted.size / chosen.size)
+        pixels = problem.loss.pixels.subset(chosen).scaled(scale)
+        look, look_noise = (
+            x.reshape(-1, 3)[chosen].T.astype(np.float64)
+            for x in (basis.current_look, basis.current_noise)
+        )
+        lit, noise = (LitPixels(x.picked(chosen), pixels) for x in (basis.planes, basis.noise))
+        return cls(lit, noise, look, look_noise, problem.pull)
+
+    def at(self, weights: Doubles) -> float:
+        """Return the loss of weights (n, 3)."""
+        light, noise = self.lit.predicted(weights), self.noise.predicted(weights)
+        plain, *noisy = (
+            float(
+                self.lit.pixels.over_look(np.maximum(self.look + sign * self.look_noise, 0))
+                .objective(np.maximum(light + sign * noise, 0))
+                .sum()
+            )
+            for sign in (0, 1, -1)
+        )
+        pulled = 0.0 if self.pull is None else float(self.pull.objective(weights).sum())
+        return 2 * plain - sum(noisy) / 2 + pulled
 
 
 def _best_share(
