@@ -210,3 +210,23 @@ def test_a_group_of_adjustments_is_hidden_as_one(client: StudioClient) -> None:
     assert studio.session.requests.spent == ((group, None),)
     studio.handle(protocol.Undo(), {})
     assert visible(client) == before
+
+
+def test_adjustments_of_a_look_come_back(client: StudioClient) -> None:
+    """A loaded look has its layers under new ids."""
+    studio = client.studio
+    client.paint(1, 0.8, (0, 6, 0, SIZE[1]))
+    adjust(client, 2, 0.5)
+    client.exact()
+    studio.handle(protocol.StartFromLamps(), {})
+    before = list(visible(client).values())
+    studio.handle(protocol.SaveLook("dim"), {})
+    [look] = studio.session.store.looks()
+    studio.handle(protocol.ClearPainting(), {})
+    studio.handle(protocol.LoadLook(look.id), {})
+    assert list(visible(client).values()) == before == [True, False, True]
+    studio.handle(protocol.StartFromLamps(is_on=False), {})
+    assert list(visible(client).values()) == [True, True]
+    studio.handle(protocol.Undo(), {})
+    studio.handle(protocol.ClearPainting(), {})
+    assert not studio.session.requests.spent

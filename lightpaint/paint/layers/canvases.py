@@ -240,13 +240,18 @@ class LayeredPaintings:
                     pixels[view.view, number] = bounds, layer.part(bounds)
         return cls(views.layers, pixels)
 
+    def new_ids(self, views: Canvases) -> dict[int, int]:
+        """Return the ids in `views` of the layers that replace all others, by their own."""
+        ids = {PAINTING_ID: PAINTING_ID}
+        for layer in self.layers:
+            ids.setdefault(layer.id, views.next_layer - 1 + len(ids))
+        return ids
+
     def patches(self, views: Canvases) -> tuple[LayerStack, tuple[Patch, ...]]:
         """Return the layers under new ids in `views`, and the patches that create them."""
         if self.view is not None:
             return self._patches_on_top(views, self.view)
-        stack, ids = self.layers, {PAINTING_ID: PAINTING_ID}
-        for layer in stack:
-            ids.setdefault(layer.id, views.next_layer - 1 + len(ids))
+        stack, ids = self.layers, self.new_ids(views)
         renamed = [
             replace(x, id=ids[x.id], group=None if x.group is None else ids[x.group]) for x in stack
         ]

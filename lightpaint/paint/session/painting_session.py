@@ -466,8 +466,11 @@ class Session:
         if self.views.is_open:
             self._drop_stroke()
         if layers is not None:
+            if layers.view is None:
+                requests = requests.with_spent_as(layers.new_ids(self.views))
             stack, patches = layers.patches(self.views)
         elif paintings:
+            requests = requests.with_spent_as({})
             stack, patches = LayerStack(), self.views.replacement_patches(paintings)
         else:
             stack, patches = self.views.layers, ()

@@ -160,6 +160,17 @@ class SessionRequests:
         emissions = {name: tuple(emission) for name, emission in start.items()}
         return replace(released, start=emissions, values=values, spent=())
 
+    def with_spent_as(self, ids: Mapping[int, int]) -> "SessionRequests":
+        """Return these requests for other layers. ids: of these, by those that they had; hidden
+        adjustments without one are gone.
+        """
+        spent = tuple(
+            (ids[number], None if copy is None else ids.get(copy))
+            for number, copy in self.spent
+            if number in ids
+        )
+        return replace(self, spent=spent)
+
     def holds(self, name: str) -> bool:
         """Return whether a light is held at a level, by itself or with others on its dimmer."""
         tied = next((names for names in self.ties if name in names), ())
