@@ -91,12 +91,13 @@ MAX_WISHES = 4
 #: Share of an only wish below which a headline begins with its being out of reach.
 HALF = 0.5
 
-#: What may bring a wish: where no light reaches it, where none reaches it alone, and where a light
-#: for it lights something else, too.
+#: What may bring a wish: where no light reaches it, where none reaches it alone, where a light for
+#: it lights something else, too, and where the light that makes it is not adjusted.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
 ALONE_ADVICE = "Add a light for it, or paint the rest as well."
 SAMPLES_ADVICE = "Render more samples."
 SPILL_ADVICE = "More importance, or lights that move, may help."
+FIXED_ADVICE = "Importance cannot help, as this light stays as it is: adjust it, too."
 
 
 def error_sentences(

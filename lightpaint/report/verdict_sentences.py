@@ -22,6 +22,7 @@ from lightpaint.lighting import (
 from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.diagnosis_sentences import (
     ALONE_ADVICE,
+    FIXED_ADVICE,
     REACH_ADVICE,
     SAMPLES_ADVICE,
     SPILL_ADVICE,
@@ -210,6 +211,8 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
     advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
     if is_reached and appearance.lacks_light_of_its_own:
         advice = ALONE_ADVICE
+    if appearance.local_lights[:1] == appearance.fixed_lights[:1] != ():
+        advice = FIXED_ADVICE
     return f"{spoken_unreached(wish)}, since {reason}. {advice}"
 
 

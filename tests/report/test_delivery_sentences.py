@@ -102,6 +102,21 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             "importance, or lights that move, may help. Rim: 95 %. On the whole: part of the "
             "way.",
         ),
+        # A lamp in view that is not adjusted shines on, whatever its importance.
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("exit_sign", "sky"),
+                fixed_lights=("exit_sign",),
+                place=replace(PLACE, reached=(0.9, 0.9, 0.9)),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: out of reach (8 % came), since exit_sign and sky light it too. Importance "
+            "cannot help, as this light stays as it is: adjust it, too. Rim: 95 %. On the whole: "
+            "about half way.",
+        ),
         # Of one painting, whose parts nobody named, the whole goes first.
         (
             _seen(5.0, VASE, WALLS, local_lights=("spot",), reasons_wish="Vase"),

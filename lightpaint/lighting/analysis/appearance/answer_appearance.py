@@ -81,6 +81,7 @@ class Appearance:
             lights that make it so.
         has_strong_light: Whether one of them contributes much there.
         held_lights: The ones among them that constraints hold back.
+        fixed_lights: The ones among them that are not adjusted, as an emitter in view may be.
         area_lights: The lights of the paint in question, and what else they light; None if not
             computed, or if all of the picture is painted.
         reasons: Constraints, holds and other views that keep the lights from the painting, the
@@ -114,6 +115,7 @@ class Appearance:
     local_lights: tuple[str, ...] = ()
     has_strong_light: bool = True
     held_lights: tuple[str, ...] = ()
+    fixed_lights: tuple[str, ...] = ()
     area_lights: AreaLights | None = None
     reasons: tuple[Reason, ...] = ()
     error_shares: Mapping[str, float] = field(default_factory=dict)
@@ -416,4 +418,5 @@ def _with_local_lights(appearance: Appearance, solution: Solution, place: Place)
         local_lights=local_lights,
         has_strong_light=has_strong_light,
         held_lights=tuple(name for name in local_lights if name in limits),
+        fixed_lights=tuple(x.name for x in lights if x.is_fixed and x.name in local_lights),
     )
