@@ -22,7 +22,7 @@ from scipy.ndimage import gaussian_filter
 import lightpaint as lp
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.answer.lighting_keys import LightingKey, weights_at
-from lightpaint.lighting.solver import solve_frames
+from lightpaint.lighting.solver import solution_of, tie_frames
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
@@ -78,7 +78,7 @@ def errors(bases: dict[int, lp.Basis], keys: tuple[int, ...], seed: int) -> Doub
     rows = []
     for tie in TIES:
         problems = [lp.Problem.of(bases[frame], targets[frame], fit=fit) for frame in keys]
-        solutions = solve_frames(problems, keys, tie=tie)
+        solutions = tie_frames([solution_of(x) for x in problems], keys, tie=tie)
         pairs = zip(keys, solutions, strict=True)
         found = [LightingKey(frame, tuple(map(tuple, x.weights))) for frame, x in pairs]
         weights = np.array([weights_at(found, frame) for frame in bases])

@@ -70,10 +70,10 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,
     )
+    from lightpaint.lighting.default_solve import solve as solve
     from lightpaint.lighting.fit import Fit as Fit
     from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
-    from lightpaint.lighting.solver import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
     from lightpaint.photometry.illuminance import MeasuringPlane as MeasuringPlane

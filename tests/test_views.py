@@ -22,9 +22,9 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solver import solve
 from lightpaint.paint.protocol import ConstrainLight, Export, Message, Paint
 from lightpaint.paint.store.history_steps import ViewIdentity
 from lightpaint.paint.store.session_file import MemoryStore

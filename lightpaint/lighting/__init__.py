@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         KEYS_BY_KIND, start_weights, tables_by_light, tied_lights,
     )
     from lightpaint.lighting.constraints.values import check_keys
+    from lightpaint.lighting.default_solve import default_answer, solve
     from lightpaint.lighting.fit import (
         DEFAULT_HOLD, Colors, Emitters, Fit, Space, resolve_fit, resolve_for_targets,
     )
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.normal_equations import NormalEquations
     from lightpaint.lighting.problem import Problem
     from lightpaint.lighting.solution import Solution
-    from lightpaint.lighting.solver import choose_mixes, solution_of, solve, solve_frames
+    from lightpaint.lighting.solver import choose_mixes, solution_of, tie_frames
     from lightpaint.lighting.unknowns.full_lamps import FullLamp, full_lamps
     from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
     from lightpaint.lighting.unknowns.reduced_problem import reduced_problems

@@ -114,7 +114,8 @@ class LinearProblem:
     equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
     noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these
     leave; full: the same with the lights that `sparse` has not chosen. fit: with nothing left open.
-    expected: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
+    expected: see `weight_pull`. holding: a pull to the current lights, of an answer that would lead
+    away from the paint. tether: a further pull on the weights, to lights at other frames;
     None for a problem that stands alone.
     """
 
@@ -129,6 +130,7 @@ class LinearProblem:
     contrast: NormalEquations | None
     restraint: NormalEquations | None
     tether: NormalEquations | None
+    holding: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
 
@@ -213,6 +215,7 @@ class LinearProblem:
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
             tether=self.tether,
+            holding=self.holding,
         )
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -285,6 +288,7 @@ class SummedProblem(LinearProblem):
     contrast: NormalEquations | None = None
     restraint: NormalEquations | None = None
     tether: NormalEquations | None = None
+    holding: NormalEquations | None = None
     painted_share: float = 1.0  # on which nothing in literal problems depends
 
     __repr__ = short_repr

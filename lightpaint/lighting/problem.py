@@ -143,6 +143,8 @@ class Problem(LinearProblem):
             hold.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
         tether: A further pull on the weights, to those at other frames of a shot; None without.
+        holding: The pull to the current lights that holds an answer which would lead away from the
+            paint; None without.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)
@@ -168,6 +170,7 @@ class Problem(LinearProblem):
     restraint: NormalEquations | None = None
     block_side: int = 1
     tether: NormalEquations | None = None
+    holding: NormalEquations | None = None
 
     __repr__ = short_repr
 

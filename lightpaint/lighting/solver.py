@@ -1,5 +1,5 @@
-"""The solve: a basis and a painting become a lighting; or, of a shot, a lighting for each painted
-frame, tied to its neighbours.
+"""The solve: a problem becomes a lighting; or, of a shot, a lighting for each painted frame, tied
+to its neighbours.
 
 What a frame hardly shows is not determined by its painting: solved alone, such a light would jump
 from key to key. So a weak term Σ_k Σ_i s ‖Φ_i‖² (w_{k+1,i} − w_{k,i})² joins the losses of all
@@ -9,19 +9,12 @@ neighbours, from the linear problem at its own answer, until the weights stay.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, release_freed_memory
-from lightpaint.basis import Basis
 from lightpaint.colour import Lamp
-from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
@@ -63,7 +56,6 @@ from lightpaint.lighting.unknowns.reduced_problem import (
 )
 from lightpaint.lighting.unknowns.reduction import Reduction, lamps_by_name
 from lightpaint.lighting.unknowns.white_mixes import next_whites
-from lightpaint.target import Target
 
 #: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share
 #: of the loss that a step has to gain.
@@ -84,58 +76,6 @@ TIE = 1e-2
 #: Largest number of rounds over all frames, and the change of a weight, relative to the largest, at
 #: which they end.
 MAX_ROUNDS, MAX_CHANGE = 100, 1e-6
-
-
-@keywords(Fit)
-def solve(
-    basis: Basis | Sequence[Basis],
-    target: Target | Sequence[Target],
-    *,
-    constraints: Constraints | None = None,
-    start: Lighting | None = None,
-    resize: bool = False,
-    **fit: Any,
-) -> Solution:
-    """Find the non-negative light colours whose image comes closest to `target`.
-
-    Fixed lights have weight 1; the others make up the rest of the target.
-
-    Args:
-        basis: Of one view; or of several, for one lighting closest to all: pixels of all views
-            count the same, and `views` of the solution has the answer to each.
-        target: Of one view; or of several, in the same order.
-        constraints: Constraints on the lights; they override the constraints of the scene's lights
-            file, which a rendered basis includes.
-        start: Lighting to begin with (the current one by default). A good guess saves sweeps; the
-            answer is the same, except for lights that reach no painted pixel, which keep the start.
-        resize: Whether to resample a target of the same shape as the basis, but of another size.
-        **fit: Any option of `Fit`, by name: `unpainted=0.1` also holds unpainted pixels to the
-            current look, `transform=lp.ViewTransform("agx")` compares display values instead of
-            linear light.
-
-    Returns:
-        The lighting, the problem it solves, and the certificate.
-
-    Raises:
-        SizeError: If basis and target differ in size, and not in whole blocks of pixels.
-        KeywordError: For a name that neither this nor `Fit` has.
-        TargetError: If no pixel counts.
-        ConstraintError: If a constraint does not fit the lights.
-        BasisError: If views differ in lights.
-
-    Examples:
-        >>> solution = lp.solve(basis, target)
-        >>> np.round(solution.lighting.emission["panel"], 2).tolist()
-        [2.0, 1.5, 1.0]
-        >>> solution
-        Solution(closest there is (KKT residual ...)...)
-    """
-    options = Fit(**fit)
-    problem = Problem.of(basis, target, constraints=constraints, fit=options, resize=resize)
-    given = constraints_of(problem.lights.requests).and_then(constraints or Constraints())
-    with_sure_scale(given, problem.lights)
-    begin = problem.start if start is None else start.weights_for(problem.basis)
-    return choose_mixes(solution_of(replace(problem, start=begin)))
 
 
 def choose_mixes(solution: Solution) -> Solution:
@@ -484,11 +424,14 @@ def _without_sparse(constraints: Constraints) -> Constraints:
     return replace(constraints, sparse=None) if constraints.sparse is not None else constraints
 
 
-def solve_frames(
-    problems: Sequence[Problem], frames: Sequence[int], *, tie: float = TIE
+def tie_frames(
+    solutions: Sequence[Solution], frames: Sequence[int], *, tie: float = TIE
 ) -> list[Solution]:
-    """Return the solution of each painted frame, in order. frames: their numbers."""
-    solutions = [solution_of(problem) for problem in problems]
+    """Return the solution of each painted frame, in order, tied to its neighbours.
+
+    solutions: of each frame by itself. frames: their numbers.
+    """
+    solutions = list(solutions)
     if len(solutions) == 1 or tie == 0:
         return solutions
     strengths = _strengths(solutions, frames, tie)

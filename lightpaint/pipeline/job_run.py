@@ -21,10 +21,11 @@ from lightpaint.lighting import (
     SurfaceColor,
     analyse,
     choose_mixes,
+    default_answer,
     hold_to_current,
     solution_of,
-    solve_frames,
     surface_colors,
+    tie_frames,
     with_findings,
 )
 from lightpaint.pipeline.job.settings import Settings
@@ -219,7 +220,7 @@ def _animated_answer(job: Job, bases: list[Basis], listen: Listener) -> JobAnswe
     ]
     bases.clear()
     with stage("solving", listen, SOLVE_ADVICE):
-        solutions = solve_frames(problems, job.painted_frames)
+        solutions = tie_frames([default_answer(x) for x in problems], job.painted_frames)
     del problems
     sweeps = max(max(solution.certificate.sweeps) for solution in solutions)
     listen.note(f"{len(solutions)} frames solved, each in at most {sweeps} sweeps")

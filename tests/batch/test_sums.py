@@ -20,10 +20,10 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_problem import Sums, reason_against_sums, sum_rows, summed_problem
 from lightpaint.lighting.linear_solve import solve_squares
-from lightpaint.lighting.solver import solve
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.target.painted_target import Target
 

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 import lightpaint as lp
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting_keys import LightingKey, key_slopes, weights_at
-from lightpaint.lighting.solver import TIE, solve_frames
+from lightpaint.lighting.solver import TIE, solution_of, tie_frames
 
 
 def keys_of(frames: Any, weights: Any) -> list[LightingKey]:
@@ -64,7 +64,7 @@ def problems_of(make_basis: Any, frames: int = 3) -> tuple[list[lp.Problem], lis
 def test_the_tied_solve_is_the_least_of_the_whole(make_basis: Any) -> None:
     problems, parts = problems_of(make_basis)
     frames, n = (1, 5, 21), 3
-    solutions = solve_frames(problems, frames)
+    solutions = tie_frames([solution_of(x) for x in problems], frames)
     spans = np.diff(frames)
     for c in range(3):
         rows, goal = [], []
@@ -93,10 +93,10 @@ def test_what_a_frame_does_not_show_comes_from_its_neighbours(make_basis: Any) -
     weights = [np.full((2, 3), x) for x in (1.0, 2.0, 3.0)]
     targets = [lp.Target.of(basis.mix(w)) for basis, w in zip(bases, weights, strict=True)]
     problems = [lp.Problem.of(*pair) for pair in zip(bases, targets, strict=True)]
-    alone = solve_frames(problems, (1, 2, 3), tie=0)
+    alone = tie_frames([solution_of(x) for x in problems], (1, 2, 3), tie=0)
     assert alone[1].weights[1, 0] == bases[1].current_weights[1, 0]
     assert alone[1].certificate.unreached == (bases[1].names[1],)
-    solutions = solve_frames(problems, (1, 2, 3))
+    solutions = tie_frames([solution_of(x) for x in problems], (1, 2, 3))
     tied = [solution.weights[1, 0] for solution in solutions]
     assert tied[1] == pytest.approx((tied[0] + tied[2]) / 2, rel=0.05)
     assert solutions[1].certificate.unreached == ()

@@ -12,13 +12,13 @@ from scipy.optimize import minimize
 from lightpaint.basis.light_basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, pixel_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.reweighting import sample_pixels
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (48, 60)

@@ -15,11 +15,12 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solver import solve, solve_frames
+from lightpaint.lighting.solver import solution_of, tie_frames
 from lightpaint.lighting.unknowns import slot_search
 from lightpaint.report.phrases import spoken_lamp, spoken_wheels
 from lightpaint.target.painted_target import Target
@@ -194,7 +195,7 @@ def test_each_frame_of_a_shot_has_slots(make_basis):
     targets = first, _case(make_basis, 2)[1]
     fit = Fit(literal=True)
     problems = [Problem.of(basis, x, constraints=constraints, fit=fit) for x in targets]
-    for solution in solve_frames(problems, [1, 20]):
+    for solution in tie_frames([solution_of(x) for x in problems], [1, 20]):
         assert solution.certificate.converged
         for light in solution.lighting.lights[:2]:
             assert sum(drive > 0 for drive in light.drives.values()) <= 1

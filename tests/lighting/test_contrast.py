@@ -10,7 +10,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.lighting import hold_to_current
+from lightpaint.lighting import PaintComparison, default_answer, solution_of, tie_frames
+from lightpaint.lighting.analysis.appearance import held_answer
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live_solver import LiveSolver
@@ -19,6 +20,9 @@ from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.lighting.loss.weight_penalty import ContrastRows
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.painted_target import Wish
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -167,8 +171,9 @@ def test_a_locked_subject_leaves_most_of_its_light_to_the_rest(
     constraints = lp.Constraints.of({"spot": {"lock": True}})
 
     def rest() -> float:
-        solution = lp.solve(basis, painting(basis, image), constraints=constraints)
-        got = basis.mix(solution.weights)[~subject()].mean()
+        # The least loss: a default answer would be held to the lights as they are.
+        problem = lp.Problem.of(basis, painting(basis, image), constraints=constraints)
+        got = basis.mix(solution_of(problem).weights)[~subject()].mean()
         return float(got / image[~subject()].mean())
 
     kept = rest()
@@ -530,11 +535,12 @@ def test_a_contrast_out_of_reach_does_not_darken_the_picture(
     missed is the one of a dark picture, farther from the painting than the current lights.
     """
     basis, target = out_of_reach(make_basis)
-    solution = lp.solve(basis, target)
+    problem = lp.Problem.of(basis, target)
+    solution = solution_of(problem)  # before it is held to the current lights
     objective = solution.problem.objective
     assert objective(solution.weights).sum() < objective(basis.current_weights).sum()
     monkeypatch.setattr(weight_penalty, "MISSED_CONTRAST", np.inf)  # never given up
-    dark = lp.solve(basis, target).weights
+    dark = solution_of(problem).weights
     assert objective(dark).sum() > objective(basis.current_weights).sum()
     assert basis.mix(dark).mean() < 0.9 * basis.mix(solution.weights).mean()
 
@@ -549,6 +555,7 @@ def test_contrasts_given_up_under_the_brush_come_back(
     basis, target = out_of_reach(make_basis)
     corner = np.zeros((H, W, 1), bool)
     corner[:5, 30:38] = True
+    monkeypatch.setattr(held_answer, "PULLS", ())  # lights are not held to the current ones
     images = np.stack([*basis.planes, np.where(corner, np.float32(1), 0.1) * np.ones(3)])
     emission = [*(light.emission for light in basis.lights), (0.02, 0.02, 0.02)]
     basis = make_basis(images=images, names=["dome", "bulb", "spot"], emission=emission)
@@ -582,17 +589,53 @@ def test_contrasts_given_up_under_the_brush_come_back(
 def test_lights_stay_where_every_change_leads_away_from_the_paint(make_basis: Any) -> None:
     """In ΔE, which reports give: the least squares change all of the picture for a part of it."""
     basis, target = out_of_reach(make_basis)
-    squares = lp.compare_appearance(lp.solve(basis, target))
+    squares = lp.compare_appearance(solution_of(lp.Problem.of(basis, target)))
     assert squares.is_worse
-    held = lp.compare_appearance(hold_to_current(lp.solve(basis, target)))
+    held = lp.compare_appearance(lp.solve(basis, target))
     assert held.delta_e < squares.delta_e - 0.2
     assert held.delta_e <= held.requested_change
-    literal = lp.solve(basis, target, literal=True)
-    assert hold_to_current(literal) is literal  # the paper's answer stays what it is
+    literal = lp.Problem.of(basis, target, fit=lp.Fit(literal=True))
+    # The paper's answer stays what it is.
+    assert default_answer(literal).lighting == solution_of(literal).lighting
 
 
 def test_no_constraint_is_blamed_for_lights_that_stay(make_basis: Any) -> None:
     """Without the hold they stay as well, as larger changes lead away from the paint."""
     basis, target = out_of_reach(make_basis)
-    held = hold_to_current(lp.solve(basis, target, hold=4.0, colors="gentle"))
+    held = lp.solve(basis, target, hold=4.0, colors="gentle")
     assert lp.compare_appearance(held).reasons == ()
+
+
+def test_every_default_answer_is_held_alike(make_basis: Any) -> None:
+    """Under the brush, in Python, in a painter's session and as the only frame of a shot."""
+    basis, target = out_of_reach(make_basis)
+    target = replace(target, over_look=True)
+    problem = lp.Problem.of(basis, target)
+    squares, now = solution_of(problem).weights, basis.current_weights
+    assert _difference(problem, squares) > _difference(problem, now) + 0.2  # else nothing holds
+    answers = {"solve": lp.solve(basis, target).weights}
+    [frame] = tie_frames([default_answer(problem)], [1])
+    answers["shot"] = frame.weights
+    image, importance = target.image.copy(), target.importance.copy()
+    fit = resolve_for_targets(lp.Fit(), [target])
+    views = [LiveView(basis, image, importance)]
+    live = LiveSolver(views, fit=fit, constraints=Constraints(), is_sketch=True)
+    answers["brush"] = now
+    for _ in range(12):
+        answers["brush"] = live.answer(answers["brush"])
+    transform = lp.ViewTransform("srgb", 0.0)
+    state = SessionRequests(), Settings(), Constraints(), transform
+    snapshot = SessionSnapshot(0, (basis,), (target,), *state)
+    exact = snapshot.solution()
+    assert exact is not None
+    answers["session"] = exact.weights
+    differences = {name: _difference(problem, w) for name, w in answers.items()}
+    assert max(differences.values()) <= _difference(problem, now) + 0.01, differences
+    for weights in answers.values():
+        np.testing.assert_allclose(basis.mix(weights), basis.mix(answers["solve"]), rtol=0.02)
+
+
+def _difference(problem: Any, weights: np.ndarray) -> float:
+    """The mean ΔE of an answer from the paint."""
+    look = PaintComparison.of_problem(problem)
+    return look.mean(look.difference(look.pixels(problem.basis.mix(weights))))

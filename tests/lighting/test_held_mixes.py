@@ -14,9 +14,9 @@ from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.held_mixes import HELD
 from lightpaint.lighting.problem import display_transform
-from lightpaint.lighting.solver import solve
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings

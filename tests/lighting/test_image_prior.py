@@ -11,10 +11,10 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights, joined_texels, light_images, texel_lights
 from lightpaint.basis.planes import as_planes
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior
-from lightpaint.lighting.solver import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
 from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs
 from lightpaint.target.painted_target import Target

@@ -18,7 +18,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighti
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.constraints.light_constraints import constraints_by_light, tables_by_light
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.painted_target import Target
 

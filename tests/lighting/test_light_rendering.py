@@ -15,7 +15,7 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.formats import spectra_csv
 from lightpaint.report.page.lights_table import rendering_numbers, rendering_section
 from lightpaint.report.phrases import rendering_sentences

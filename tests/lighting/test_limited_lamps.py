@@ -12,7 +12,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)

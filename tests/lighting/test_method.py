@@ -9,7 +9,7 @@ from nightly import seeds
 
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.target.painted_target import Target
 

@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, painting_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -27,7 +28,7 @@ from lightpaint.lighting.loss.pixel_loss import image_of, planes_of
 from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solve, solve_again
+from lightpaint.lighting.solver import solve_again
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.target.painted_target import Target
 

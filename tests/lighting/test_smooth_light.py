@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import (
     correct_noise,
     on_smooth_light,
 )
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE, LIGHTS = (32, 48), 64

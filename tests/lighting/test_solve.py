@@ -20,8 +20,8 @@ from lightpaint.errors import (
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.loss.painting import target_squares
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (12, 10)

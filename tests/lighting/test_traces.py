@@ -9,8 +9,8 @@ from light_groups import pictures
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.problem import remove_traces
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (24, 32)

@@ -17,8 +17,8 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solve
 from lightpaint.placement.light_changes import Placement
 from lightpaint.placement.place_search import (
     check_suggestible,

@@ -14,7 +14,7 @@ from nightly import nightly
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.target.painted_target import Target
 

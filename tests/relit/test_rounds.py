@@ -11,7 +11,7 @@ from renderer import CORNELL
 import lightpaint as lp
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification_render import refine_by_rendering
 from lightpaint.scene.scene_render import Stream, pass_seed
 

@@ -14,7 +14,7 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.relit.relit_scene import check_relightable, relight
 from lightpaint.relit.verification_render import verify

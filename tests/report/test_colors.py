@@ -10,7 +10,7 @@ import pytest
 from lightpaint.colour.color import hue_name, kelvin_to_rgb
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.limit_sections import closer_choice, colors_section, spoken_choice

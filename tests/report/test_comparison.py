@@ -26,7 +26,7 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import Painting
 from lightpaint.pipeline.job_run import run

@@ -10,7 +10,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.answer_analysis import without_constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.page.limit_sections import constraints_section
 from lightpaint.target.painted_target import Target
 

@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns import reduced_problem
 from lightpaint.pipeline.results.look import Look, write_report
 from lightpaint.placement.suggestion import Suggestion

@@ -17,7 +17,7 @@ from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.measures import (
     ReportedAnswer,

@@ -17,8 +17,8 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.html import ROWS_SHOWN

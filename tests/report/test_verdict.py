@@ -22,7 +22,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SH
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.verdict_sentences import headline, verdict
 from lightpaint.target.painted_target import Target

@@ -10,7 +10,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.primaries import encode_display
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.formats.exr import read_parts
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 from lightpaint.target.target_reader import read_target
 from lightpaint.target.template import write_look

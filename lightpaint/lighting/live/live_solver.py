@@ -24,8 +24,9 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis import Basis, texel_lights
-from lightpaint.colour import Lamp
+from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.display_text import short_repr
+from lightpaint.lighting.analysis.appearance.held_answer import closest_to_paint, holding_pull
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
@@ -39,6 +40,7 @@ from lightpaint.lighting.linear_problem import (
     whites_for,
 )
 from lightpaint.lighting.linear_solve import at_slots, solve_linear
+from lightpaint.lighting.live.live_difference import LiveDifference
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
@@ -198,7 +200,8 @@ class LiveSolver:
 
     views: of one lighting; report strokes to each by `update`. fit: with nothing left open, as
     `resolve_for_targets` returns it. constraints: all constraints on the lights. is_sketch: as for
-    `Fit.reads_wishes`.
+    `Fit.reads_wishes`. display: the view transform that answers are judged by where the fit has
+    none.
     """
 
     def __init__(
@@ -208,8 +211,9 @@ class LiveSolver:
         fit: Fit,
         constraints: Constraints,
         is_sketch: bool = False,
+        display: ViewTransform | None = None,
     ) -> None:
-        self._is_sketch = is_sketch
+        self._is_sketch, self._display = is_sketch, display
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
@@ -240,6 +244,7 @@ class LiveSolver:
         self._near = Multipliers(MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
         self._given_up: NormalEquations | None = None  # contrasts that lights cannot bring
+        self._last_free: Doubles | None = None  # the last answer without a hold, while one holds
         self._many = ManyLights(len(self._basis.lights))
         self._films = None if self._start != constraints.start else self._films
         self._start = constraints.start
@@ -324,36 +329,85 @@ class LiveSolver:
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
         unpainted = unpainted_weight(float(painted), float(rest), self._problem.fit)
-        if not (while_painting and self._answers_left and self._last_read == views):
+        is_read = not (while_painting and self._answers_left and self._last_read == views)
+        if is_read:
             self._read_paint(views, unpainted)
         self._answers_left -= 1
-        # After a change of the painting the last answer may be worse than the current lighting.
-        starts = start, self._unpainted_answer()
-        improve = partial(self._improve, views=views, unpainted=unpainted, is_moving=while_moving)
-        mixed = improve(self._problem, starts)
-        if self._is_spoilt_by_contrast(mixed.weights, views, unpainted):
-            self._given_up = mixed.problem.contrast
-            without = replace(mixed.problem, contrast=None)
-            mixed = improve(without, (mixed.weights, self._unpainted_answer()))
+        paint: dict[str, Any] = {"views": views, "unpainted": unpainted, "is_moving": while_moving}
+        improve = partial(self._improve_mixed, **paint)
+        mixed = self._held(start, views, improve) if is_read else improve(self._problem, start)
         self._problem = mixed.problem
-        answer = at_slots(mixed, lambda x, w: improve(x, (nearest_weights(x.reduction, w),)))
+        answer = at_slots(
+            mixed, lambda x, w: self._improve(x, (nearest_weights(x.reduction, w),), **paint)
+        )
         answer = answer or mixed
         self._mixed_emissions = answer.problem.reduction.mixed_emissions
         return answer.weights
 
+    def _held(
+        self,
+        start: Doubles,
+        views: tuple[LiveView, ...],
+        improve: Callable[[LiveProblem, Doubles], _Improved],
+    ) -> _Improved:
+        """Return the answer, held to the current lights as exact answers are.
+
+        start: the last weights. improve: as `_improve_mixed`.
+        """
+        last_free, self._last_free = self._last_free, None
+        free = improve(
+            replace(self._problem, holding=None), start if last_free is None else last_free
+        )
+        problem = free.problem
+        if not problem.fit.reads_wishes(is_sketch=self._is_sketch):
+            return free
+        films, transform = self._joint_films(views), problem.fit.transform
+        layers, display = [view.layers for view in views], transform or self._display
+        paint = LiveDifference(films.parts, layers, display or ViewTransform(), transform)
+        held, strength = closest_to_paint(
+            free,
+            lambda x: improve(replace(problem, holding=holding_pull(problem, x)), start),
+            difference=lambda x: paint.of(films.picture(x.weights)),
+            difference_now=paint.now,
+            have_come=lambda x: paint.have_wishes_come(films.picture(x.weights)),
+        )
+        self._last_free = free.weights if strength > 0 else None
+        return held
+
+    def _improve_mixed(
+        self,
+        problem: LiveProblem,
+        start: Doubles,
+        *,
+        views: tuple[LiveView, ...],
+        unpainted: float,
+        is_moving: bool,
+    ) -> _Improved:
+        """Improve weights (n, 3), with mixed slots of colour wheels, and without contrasts that
+        lights cannot bring. For the other arguments see `_improve`.
+        """
+        improve = partial(self._improve, views=views, unpainted=unpainted, is_moving=is_moving)
+        # After a change of the painting the last answer may be worse than the current lighting.
+        mixed = improve(problem, (start, self._unpainted_answer()))
+        if not self._is_spoilt_by_contrast(mixed, views, unpainted):
+            return mixed
+        self._given_up = mixed.problem.contrast
+        without = replace(mixed.problem, contrast=None)
+        return improve(without, (mixed.weights, self._unpainted_answer()))
+
     def _is_spoilt_by_contrast(
-        self, weights: Doubles, views: tuple[LiveView, ...], unpainted: float
+        self, answer: _Improved, views: tuple[LiveView, ...], unpainted: float
     ) -> bool:
         """Return whether contrasts are to be given up, as exact answers do."""
-        if self._problem.contrast is None:
+        problem = answer.problem
+        if problem.contrast is None:
             return False
-        transform = self._problem.fit.transform
         films = self._joint_films(views)
-        pixels = films.pixels(unpainted, transform)
+        pixels = films.pixels(unpainted, problem.fit.transform)
         return is_spoilt_by_contrast(
-            self._problem.contrast,
-            weights,
-            self._problem.reference,
+            problem.contrast,
+            answer.weights,
+            problem.reference,
             lambda w: films.objective(pixels, w),
         )
 

@@ -132,7 +132,8 @@ class SmallFilm:
         at_least: AtLeast = lambda: None,
     ) -> None:
         height, width = importance.shape
-        self._side = side = max(1, ceil((height * width / max_pixels) ** 0.5))
+        self._side: int = max(1, ceil((height * width / max_pixels) ** 0.5))
+        side = self._side
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
         self._planes, self._at_least, self._marks = basis.planes, at_least, np.zeros((3, 0), bool)
         rows, columns = -(-height // side), -(-width // side)
@@ -246,6 +247,34 @@ class SmallFilm:
             )
         self._transform = transform
 
+    @property
+    def side(self) -> int:
+        """Pixels along the side of a block."""
+        return self._side
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of blocks."""
+        return self._size
+
+    @property
+    def look(self) -> Doubles:
+        """(3, p), the current look."""
+        return self._current
+
+    @property
+    def paint(self) -> tuple[Doubles, Doubles, Bools]:
+        """The paint of each block, (3, p), its mean importance, (p,), and where brighter is as
+        good, (3, p).
+        """
+        marks = self._marks if self._marks.size else np.zeros(self._painted.shape, bool)
+        return self._painted, self._a / self._side**2, marks
+
+    @property
+    def has_emitters_alone(self) -> Bools:
+        """(h', w'), blocks in which nothing but emitters is in view."""
+        return np.asarray(self._counts.reshape(self._size) == 0)
+
     def mix(self, weights: Doubles) -> Floats:
         """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
         # In float32, as the averages are: many lights would be copied as float64.
@@ -339,6 +368,11 @@ class Films:
         return np.concatenate([film.albedo for film in self._films], axis=1)
 
     @property
+    def parts(self) -> Sequence[SmallFilm]:
+        """The film of each view."""
+        return self._films
+
+    @property
     def has_mark(self) -> Bools:
         """See `SmallFilm.has_mark`, of all blocks, (p,)."""
         return np.concatenate([film.has_mark for film in self._films])
@@ -357,6 +391,10 @@ class Films:
         """Return the loss of all pixels, as `SmallFilm.pixels` does."""
         parts = [film.pixels(rest_weight, transform) for film in self._films]
         return parts[0] if len(parts) == 1 else join_pixels(parts)
+
+    def picture(self, weights: Doubles) -> Doubles:
+        """Return the picture of weights (n, 3), (3, p)."""
+        return self._mixed(weights)
 
     def objective(self, pixels: PaintedPixels, weights: Doubles) -> float:
         """Return the loss of weights (n, 3), all channels together."""

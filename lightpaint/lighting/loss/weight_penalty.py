@@ -340,10 +340,12 @@ def joint_pull(
     painted_share: float,
     keeps_color: Bools,
     tether: NormalEquations | None = None,
+    holding: NormalEquations | None = None,
 ) -> NormalEquations | None:
     """Return the sum of all penalties on the weights; None without any.
 
-    reference: (n, 3), the lighting to start from. tether: a pull to lights at other frames. For the
+    reference: (n, 3), the lighting to start from. tether: a pull to lights at other frames.
+    holding: a pull to the current lights, of an answer that would lead away from the paint. For the
     other arguments see `weight_pull`.
     """
     pull = weight_pull(
@@ -359,7 +361,7 @@ def joint_pull(
         power, reference, fit, near=constraints.near, painted_share=painted_share
     )
     prior = image_prior(lights, power, fit, painted_share, terms.expected)
-    parts = (pull, near, prior, terms.contrast, terms.restraint, tether)
+    parts = (pull, near, prior, terms.contrast, terms.restraint, tether, holding)
     return _sum(*parts)
 
 

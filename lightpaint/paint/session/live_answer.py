@@ -96,7 +96,13 @@ class LiveAnswer:
         if former_basis.names != self._basis.names:
             self.weights = weights_by_name(self.weights, former_basis.names, self._basis.lights)
         constraints = self._constraints(self.requests)
-        self._live = LiveSolver(views, fit=self.fit, constraints=constraints, is_sketch=True)
+        self._live = LiveSolver(
+            views,
+            fit=self.fit,
+            constraints=constraints,
+            is_sketch=True,
+            display=self._transform,
+        )
         self._live.prepare()
 
     def follow_planes(self) -> None:

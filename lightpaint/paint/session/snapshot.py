@@ -77,10 +77,10 @@ class SessionSnapshot:
         return self._exact_solution(replace(self.settings, colors=colors))
 
     def _exact_solution(self, settings: Settings) -> lighting.Solution:
-        solution = lighting.solution_of(self._problem(constraints=self.constraints, fit=settings))
+        problem = self._problem(constraints=self.constraints, fit=settings)
         if settings.corrects_noise(is_known=self.bases[0].knows_noise):
-            solution = lighting.correct_noise(solution)
-        return lighting.choose_mixes(solution)
+            return lighting.choose_mixes(lighting.default_answer(problem, lighting.correct_noise))
+        return lighting.choose_mixes(lighting.default_answer(problem))
 
     def _problem(self, **options: Any) -> lighting.Problem:
         return lighting.Problem.of(

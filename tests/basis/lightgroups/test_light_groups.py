@@ -16,7 +16,7 @@ from lightpaint.colour.primaries import to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 Writer = Callable[..., Path]

@@ -7,7 +7,7 @@ import numpy as np
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.analysis.answer_analysis import ambiguities, indistinguishable
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 NAMES = ["key", "fill", "rim", "sky", "lamp"]

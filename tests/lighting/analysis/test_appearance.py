@@ -25,7 +25,7 @@ from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.verdict_sentences import headline
 from lightpaint.target.painted_target import Target, Wish
 

@@ -19,7 +19,7 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)

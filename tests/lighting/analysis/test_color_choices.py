@@ -8,8 +8,8 @@ import pytest
 from lightpaint.lighting.analysis.appearance.answer_appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (20, 24)

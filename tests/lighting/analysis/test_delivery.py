@@ -22,7 +22,7 @@ from lightpaint.lighting.analysis.appearance.delivery import (
 )
 from lightpaint.lighting.analysis.appearance.wish_parts import wish_parts
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (24, 48)

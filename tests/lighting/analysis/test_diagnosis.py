@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (12, 18)

@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.residuals import channel_grain
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.diagnosis_sentences import error_sentences
 from lightpaint.target.painted_target import Target
 

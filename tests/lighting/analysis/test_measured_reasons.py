@@ -12,8 +12,8 @@ from lightpaint.lighting.analysis.appearance.answer_appearance import compare_ap
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import ConstraintsByLight
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (90, 150)

@@ -7,7 +7,7 @@ import pytest
 
 from lightpaint.colour import ViewTransform
 from lightpaint.lighting.analysis.noise.noise_correction import NoiselessLoss
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target import Target
 
 SIZE = 24, 40

@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise import basis_noise, noise_rows
 from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels, noise_sums
 from lightpaint.lighting.analysis.noise.noise_rows import FOLDED_PIXELS, MANY_LIGHTS, folded
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 N, SIZE = 4, (9, 11)

@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.noise.dominant_pixels import (
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.diagnosis_sentences import (
     UNTOLD_HERE,
     spoken_errors,

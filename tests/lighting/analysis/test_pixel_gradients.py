@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.noise.residuals import (
     steadier_light,
 )
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)

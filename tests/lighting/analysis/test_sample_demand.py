@@ -15,7 +15,7 @@ from lightpaint.lighting.analysis.noise.sample_demand import (
     top_up_counts,
 )
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (20, 24)

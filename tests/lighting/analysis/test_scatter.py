@@ -10,7 +10,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.noise_rows import UNCORRECTED, factor, values_beside
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.analysis.noise.weight_directions import WeightSpread
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)

@@ -22,7 +22,7 @@ from lightpaint.colour.spectra.spectrum import (
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.rendered_colors import surface_colors
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.report.page.lights_table import rendering_section
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_reflectances

@@ -29,8 +29,8 @@ from lightpaint.lighting.analysis.noise.uncertainty import (
 )
 from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)

@@ -13,8 +13,8 @@ from lightpaint.lighting.analysis.noise import basis_noise as noise
 from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.weight_directions import Directions
 from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
-from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.painted_target import Target
 

@@ -16,7 +16,7 @@ from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
 from lightpaint.target.painted_target import Target
 

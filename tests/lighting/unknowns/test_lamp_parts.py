@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.solver import solve
+from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduction import lamps_by_name, reduce_to
 from lightpaint.target.painted_target import Target

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour import ciede2000, lab, luminance
+from lightpaint.colour import ViewTransform, ciede2000, lab, luminance
 from lightpaint.display_text import visible
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.wish_parts import (
@@ -247,17 +247,50 @@ class DeliveryReport:
         return delivery.name if delivery is not None and is_part else ""
 
 
+class PaintedView(NamedTuple):
+    """What deliveries are measured from in a view.
+
+    target: its painting. emitters_seen: (h, w), where an emitter is in view. now, got: (h, w, 3)
+    linear, the scene as it is and the answer.
+    """
+
+    target: Target
+    emitters_seen: Bools
+    now: Floats
+    got: Floats
+
+
+def have_wishes_come(views: Sequence[PaintedView], transform: ViewTransform) -> bool:
+    """Return whether the wishes of all views came, as in `has_come`. transform: of the display."""
+    parts = [wish_parts(find_wishes(view.target, view.now), None) for view in views]
+    return has_come(_measure_parts(views, parts, transform).deliveries)
+
+
+def painted_views(solution: Solution, look: Floats, picture: Floats) -> list[PaintedView]:
+    """Return what deliveries are measured from in each view of a solution.
+
+    look, picture: of the scene as it is now and of the answer, in the shape of the joint basis.
+    """
+    views = solution.problem.views
+    pairs = enumerate(zip(views.bases, views.targets, strict=True))
+    return [
+        PaintedView(target, basis.emitters_seen, views.part(look, k), views.part(picture, k))
+        for k, (basis, target) in pairs
+    ]
+
+
 def measure_deliveries(solution: Solution, picture: Floats) -> DeliveryReport:
     """Measure how much of each wish came, in all views of `solution` together.
 
     picture: of the answer, in the shape of the joint basis.
     """
-    basis, views = solution.basis, solution.problem.views
+    basis, transform = solution.basis, display_transform(solution.problem)
+    views = painted_views(solution, basis.current_look, picture)
     parts = [
-        wish_parts(find_wishes(target, views.part(basis.current_look, k)), view.objects)
-        for k, (view, target) in enumerate(zip(views.bases, views.targets, strict=True))
+        wish_parts(find_wishes(view.target, view.now), own_basis.objects)
+        for view, own_basis in zip(views, solution.problem.views.bases, strict=True)
     ]
-    report = _measure_parts(solution, parts, basis.current_look, picture)
+    report = _measure_parts(views, parts, transform)
     if worst_delivery(report.deliveries) is None or not basis.knows_noise:
         return report
     return replace(report, deliveries=_with_errors(solution, parts, report.deliveries, picture))
@@ -273,6 +306,7 @@ def _with_errors(
     `_measure_parts`.
     """
     basis, rng = solution.basis, np.random.default_rng(SEED)
+    transform = display_transform(solution.problem)
     look_noise, noise = basis.current_noise, basis.noise.mix(solution.weights)
     changes = []
     for _ in range(NOISY_PICTURES):
@@ -280,7 +314,8 @@ def _with_errors(
         signs = rng.choice(np.array([-1, 1], np.float32), picture.shape[:2])[..., None]
         look = np.maximum(basis.current_look + signs * look_noise, 0)
         got = np.maximum(picture + signs * noise, 0)
-        noisy = _measure_parts(solution, parts, look, got).deliveries
+        views = painted_views(solution, look, got)
+        noisy = _measure_parts(views, parts, transform).deliveries
         if len(noisy) == len(deliveries):
             pairs = zip(deliveries, noisy, strict=True)
             changes.append([_changes_of_shares(*pair) for pair in pairs])
@@ -307,25 +342,19 @@ def _changes_of_shares(measured: Delivery, noisy: Delivery) -> tuple[float, floa
 
 
 def _measure_parts(
-    solution: Solution, parts: Sequence[Sequence[WishPart]], look: Floats, picture: Floats
+    views: Sequence[PaintedView], parts: Sequence[Sequence[WishPart]], transform: ViewTransform
 ) -> DeliveryReport:
-    """Measure the delivery of wishes that are known.
-
-    parts: the wishes of each view. look, picture: of the scene as it is now and of the answer, in
-    the shape of the joint basis.
-    """
-    views, transform = solution.problem.views, display_transform(solution.problem)
+    """Measure the delivery of wishes that are known. parts: the wishes of each view."""
     found: list[Delivery] = []
     areas: list[Floats] = []
     painted: list[AreaWashes] = []
-    for k, (basis, target) in enumerate(zip(views.bases, views.targets, strict=True)):
-        now, got = (views.part(x, k) for x in (look, picture))
+    for (target, seen, now, got), own_parts in zip(views, parts, strict=True):
         is_painted = target.importance > 0
-        counts = (is_painted | ~basis.emitters_seen) & ~_rims(basis.emitters_seen & ~is_painted)
+        counts = (is_painted | ~seen) & ~_rims(seen & ~is_painted)
         asked = _asked_light(target, now, got)
         washes = Washes.of(now, asked, got, counts=counts, transform=transform)
         painted.append(washes.of_area(np.minimum(target.importance, 1))[0])
-        for part in parts[k]:
+        for part in own_parts:
             wish, rest = washes.of_area(part.area * is_painted)
             if wish.lit_pixels > 0:
                 found.append(_delivery(part, wish, rest))

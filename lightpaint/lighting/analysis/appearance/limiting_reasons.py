@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.appearance.display_difference import (
     UnpaintedChange,
     change_from_scene,
 )
+from lightpaint.lighting.analysis.appearance.held_answer import answer_released
 from lightpaint.lighting.analysis.appearance.pixel_sample import (
     LimitGroup,
     PixelSample,
@@ -30,7 +31,6 @@ from lightpaint.lighting.constraints.light_constraints import ALL_LIGHTS_KINDS, 
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solution_of
 
 #: Share of the error from which a reason counts, and from which a headline names it.
 MIN_SHARE, HEADLINE_SHARE = 0.05, 1 / 3
@@ -356,7 +356,7 @@ def released_weights(
     )
     # What holds an answer to other lights is no reason that could be released.
     released = replace(released, start=problem.start, tether=problem.tether)
-    released_solution = solution_of(released)
+    released_solution = answer_released(released, problem.holding)
     if problem.corrected is not None and solution.basis.knows_noise:
         released_solution = correct_noise(released_solution)
     return released_solution.weights

@@ -12,6 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis, block_means
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.held_answer import answer_released
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     ALL_LIGHTS_KINDS,
@@ -24,7 +25,6 @@ from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solution_of
 from lightpaint.target import Target, find_wishes
 
 #: Lights beyond which their colours are not tried as a reason.
@@ -216,17 +216,18 @@ class PixelSample:
             constraints=Constraints() if "constraints" in without else in_force,
             fit=replace(fit, **change),
         )
-        begin = replace(problem, start=self.problem.start, tether=self._tether_of(problem))
-        return solution_of(begin).weights
+        begin = replace(
+            problem, start=self.problem.start, tether=self._scaled(self.problem.tether, problem)
+        )
+        return answer_released(begin, self._scaled(self.problem.holding, problem)).weights
 
-    def _tether_of(self, sampled: Problem) -> NormalEquations | None:
-        """Return the pull that holds the answer to other lights, in the scale of the sample: it is
-        no reason that could be released.
+    def _scaled(self, pull: NormalEquations | None, sampled: Problem) -> NormalEquations | None:
+        """Return a pull to other lights in the scale of the sample: it is no reason that could be
+        released.
         """
-        tether = self.problem.tether
-        if tether is None:
+        if pull is None:
             return None
-        return tether.scaled(float(sampled.power.sum() / max(self.problem.power.sum(), 1e-300)))
+        return pull.scaled(float(sampled.power.sum() / max(self.problem.power.sum(), 1e-300)))
 
     def _unpainted_weight(self, fit: Fit, remaining: Sequence[int]) -> float:
         """Return the weight of each of the sampled unpainted pixels of some views.
