@@ -198,6 +198,7 @@ class PlanesBase:
         power, _ = self.power_and_totals(np.ones(self.size, np.bool_))
         return np.asarray(power.sum(axis=1))
 
+    @one_thread()
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
         power, totals = np.zeros((2, self.count, 3))
