@@ -180,25 +180,28 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     variance of the residual from pixel to pixel, less the variance of the prediction
     (residuals.py).
     """
-    pixels, is_coupled = NoisyPixels.of(solution), _is_coupled(solution)
-    size, n = solution.basis.size, len(solution.weights)
-    counted, everything = solution.importance > 0, slice(0, pixels.unseen.size)
-    residual, mixed = pixels.residuals.residual(everything), pixels.residuals.noise(everything)
+    residuals, is_coupled = Residuals.of(solution), _is_coupled(solution)
+    planes, size, n = solution.basis.planes, solution.basis.size, len(solution.weights)
+    weight = solution.problem.squares.weight
+    weight = weight.reshape(-1, weight.shape[2])
+    counted, everything = solution.importance > 0, slice(0, len(weight))
+    residual, mixed = residuals.residual(everything), residuals.noise(everything)
     roots = np.zeros(residual.shape)
     for c in range(3):
-        D = pixels.weight[:, c % pixels.weight.shape[1]].astype(np.float64)
+        D = weight[:, c % weight.shape[1]].astype(np.float64)
         of_both, of_prediction = (
             channel_grain((np.sqrt(D) * x[:, c]).reshape(size), counted).ravel()
             for x in (residual, mixed)
         )
         roots[:, c] = np.sqrt(D * np.maximum(of_both - of_prediction, 0))
-    if np.square(roots).sum() <= MIN_PAINTING_NOISE * (pixels.weight * np.square(mixed)).sum():
+    if np.square(roots).sum() <= MIN_PAINTING_NOISE * (weight * np.square(mixed)).sum():
         return None
     covariance = np.zeros((3, n, 3, n))
-    step, kind = block_of(pixels.planes)
-    for start in with_progress(range(0, pixels.counted.size, step)):
-        part = as_slice(pixels.counted[start : start + step])
-        lit = pixels.planes.pixels(part)
+    step, kind = block_of(planes)
+    counted_pixels = np.flatnonzero(counted)
+    for start in with_progress(range(0, counted_pixels.size, step)):
+        part = as_slice(counted_pixels[start : start + step])
+        lit = planes.pixels(part)
         rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
         for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
             # Its noise, too, is the noise of paths, which carry all channels.
