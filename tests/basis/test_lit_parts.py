@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.arrays import round_to_halves
 from lightpaint.basis.file import basis_file, file_parts, lit_planes
 from lightpaint.basis.file.basis_file import FORMAT_KEY, LIT_FORMAT, as_stored, is_file_of
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import TILE
-from lightpaint.basis.file.light_channels import PREFIXES, STEP
+from lightpaint.basis.file.light_channels import PREFIXES, STEP, noise_numbers
 from lightpaint.basis.file.lit_parts import MAX_STEP, lit_channels, read_lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import (
@@ -49,6 +50,19 @@ def by_tiles(values: np.ndarray) -> np.ndarray:
     """Σ x² of each tile and channel."""
     squares = np.square(values, dtype=np.float64)
     return squares.reshape(SIZE[0] // TILE, TILE, SIZE[1] // TILE, TILE, 3).sum(axis=(1, 3))
+
+
+def test_numbers_of_noise_are_rounded_products_to_the_bit() -> None:
+    """Of all half floats below infinity with ratios of 1 and −1, whose product is not computed, and
+    others.
+    """
+    light = np.arange(0x7C00, dtype=np.uint16).view(np.float16)
+    signs = np.stack([light, -light])
+    for ratio in (1, -1, 0, -0.0, 0.5, -0.999, 3e-6):
+        ratios = np.full(signs.shape, ratio, np.float16)
+        expected = round_to_halves(signs.astype(np.float32) * ratios.astype(np.float32))
+        numbers = noise_numbers(signs, ratios)
+        np.testing.assert_array_equal(numbers.view(np.uint16), expected.view(np.uint16))
 
 
 @pytest.mark.parametrize("light", [1e-25, 1.0, 1e20])

@@ -34,6 +34,9 @@ PREFIXES = (("", "half_ratio."), ("indirect.", "indirect_half_ratio."))
 #: All channels of a part with indirect light.
 LIT_CHANNELS = {STEP, *(f"{prefix}{c}" for pair in PREFIXES for prefix in pair for c in "RGB")}
 
+#: Bits of half floats: the sign, and the number 1.
+_SIGN, _ONE = np.uint16(0x8000), np.float16(1).view(np.uint16)
+
 
 def has_indirect_channels(names: Collection[str]) -> bool:
     """Return whether the part of a light with these channels has its indirect light."""
@@ -59,16 +62,23 @@ def noise_numbers(
     light: npt.NDArray[np.float16], ratios: npt.NDArray[np.float16]
 ) -> npt.NDArray[np.float16]:
     """Return the stored numbers of a half difference from those that its image has, and ratios."""
-    return round_to_halves(as_singles(light) * as_singles(ratios))
+    bits, of_ratios = light.view(np.uint16), ratios.view(np.uint16)
+    # Most ratios are 1 or −1, which change the sign alone.
+    numbers = bits ^ (of_ratios & _SIGN)
+    others = np.flatnonzero((of_ratios & ~_SIGN) != _ONE)
+    products = as_singles(light.reshape(-1)[others]) * as_singles(ratios.reshape(-1)[others])
+    numbers.reshape(-1)[others] = round_to_halves(products).view(np.uint16)
+    return numbers.view(np.float16)
 
 
 def lit_pixels(steps: npt.NDArray[np.float16], size: tuple[int, int]) -> npt.NDArray[np.uint32]:
     """Return the lit pixels of a part, in row-major order. Raises BasisError if damaged."""
-    count = np.count_nonzero(steps)
-    counted = np.nan_to_num(steps[:count].astype(np.float64), nan=0.5)
-    pixels = np.cumsum(counted) - 1
-    is_whole = (counted == np.rint(counted)).all() and (counted > 0).all()
-    if not is_whole or (count and pixels[-1] >= size[0] * size[1]):
+    counted = as_singles(steps[: np.count_nonzero(steps)])
+    # Half floats that are whole are far within the range of integers.
+    whole = np.where(np.isfinite(counted), counted, 0).astype(np.int64)
+    pixels = np.cumsum(whole) - 1
+    is_valid = (whole == counted).all() and (whole > 0).all()
+    if not is_valid or (whole.size and pixels[-1] >= size[0] * size[1]):
         raise BasisError("the steps between the lit pixels of a light are wrong")
     return pixels.astype(np.uint32)
 
