@@ -77,15 +77,17 @@ BRIGHTER, GREENER = (1.05, 1.05, 1.05), (0.95, 1.08, 0.95)
 #: and when that is drawn.
 WATCH = """() => {
   const { host, engine } = document.getElementById('lightpaint').painter;
-  const { screen } = engine;
+  const { screen, mirror } = engine;
   const times = [], send = host.send.bind(host), draw = screen.drawNow.bind(screen);
-  let moved = 0, answered = 0;
+  let moved = 0, answered = 0, mixing = 0;
   for (const kind of ['pointermove', 'pointerdown'])
     addEventListener(kind, (event) => { moved = event.timeStamp; }, true);
   host.send = async (kind, fields, arrays) => {
-    const at = moved;
+    const at = kind === 'mix' ? mixing : moved;
     const reply = await send(kind, fields, arrays);
-    if (kind === 'paint' && !fields.is_final) answered = at;
+    // Where the session mixes the picture, that comes after the answer.
+    if (kind === 'paint' && !fields.is_final) [mixing, answered] = [at, mirror.hasMixes ? 0 : at];
+    if (kind === 'mix' && fields.is_live) answered = at;
     return reply;
   };
   screen.drawNow = () => {

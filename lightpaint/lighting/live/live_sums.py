@@ -51,6 +51,9 @@ GOOD_FALL = 0.75
 #: current lighting stay the same.
 KEPT_PICTURES = 4
 
+#: Drafts that are found from one another, until all lights are added up again: round-off grows.
+DRAFTS_PER_SUM = 64
+
 
 class PaintedTiles:
     """Equations of painted pixels and of the rest, each at weight 1, in linear light."""
@@ -145,11 +148,12 @@ class SmallFilm:
         #: (3, n, p) float32, which suffices for averages: sums of it take half the time.
         self.rows: Floats = array_once(basis.planes, name, lambda: self._averages(basis.planes))
         self._owns_rows = False
+        self._draft: tuple[Floats, Floats, int] | None = None
         #: (3, p), of the visible surfaces; 1 where it is not known.
         self.albedo: Floats = np.ones(self.rows.shape[::2], np.float32)
         if basis.features is not None:
-            self.albedo = _planes(self._average(basis.features.albedo))
-        self._current = _planes(self._average(basis.current_look))
+            self.albedo = _planes(self.average(basis.features.albedo))
+        self._current = _planes(self.average(basis.current_look))
         self._painted = self._current.copy()
         # The paint as the wash averages it: importance beyond 1 is no larger cover.
         self._washed = self._current.copy()
@@ -160,11 +164,11 @@ class SmallFilm:
 
     def _averages(self, planes: Planes) -> Floats:
         """Return the averages of all planes, (3, n, p)."""
-        small = np.stack([self._average(x) for x in planes])
+        small = np.stack([self.average(x) for x in planes])
         by_channel = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
         return np.ascontiguousarray(by_channel, np.float32)
 
-    def _average(self, image: Floats) -> Floats:
+    def average(self, image: Floats) -> Floats:
         """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
         side, (height, width) = self._side, image.shape[:2]
         if side == 1 or (self._shown.all() and not (height % side or width % side)):
@@ -192,11 +196,11 @@ class SmallFilm:
 
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
         """Average the replaced planes of some lights, by number."""
-        self._planes = basis.planes
+        self._planes, self._draft = basis.planes, None
         if not self._owns_rows:
             self.rows, self._owns_rows = self.rows.copy(), True
         for k in lights:
-            self.rows[:, k] = _planes(self._average(basis.planes.plane(k)))
+            self.rows[:, k] = _planes(self.average(basis.planes.plane(k)))
 
     def update(self, region: Slices) -> None:
         """Average anew the blocks that a rectangle touches."""
@@ -281,6 +285,27 @@ class SmallFilm:
         columns = weights.T.astype(np.float32)
         mixed = np.stack([w @ rows for w, rows in zip(columns, self.rows, strict=True)], axis=-1)
         return np.asarray(mixed.reshape(*self._size, 3), np.float32)
+
+    def draft(self, weights: Doubles) -> Floats:
+        """Return the same as `mix` but for round-off, from the last draft if few lights differ."""
+        columns = weights.T.astype(np.float32)
+        channels, before, count = self._draft or (None, columns, 0)
+        changed = np.flatnonzero((columns != before).any(axis=0))
+        with one_thread():
+            if channels is None or count == DRAFTS_PER_SUM or 2 * len(changed) > len(weights):
+                count, pairs = 0, zip(columns, self.rows, strict=True)
+                channels = np.stack([w @ rows for w, rows in pairs])
+            else:
+                steps, rows = (columns - before)[:, changed], (x[changed] for x in self.rows)
+                channels = channels + [w @ x for w, x in zip(steps, rows, strict=True)]
+        self._draft = channels, columns, count + 1
+        return channels.T.reshape(*self._size, 3)
+
+    def lights_at(self, row: int, column: int) -> Floats:
+        """Return the light of all planes in the block of a pixel, the nearest outside, (n, 3)."""
+        rows, columns = self._size
+        y, x = min(row // self._side, rows - 1), min(column // self._side, columns - 1)
+        return np.ascontiguousarray(self.rows[:, :, y * columns + x].T)
 
     def wash(self, layers: LayerWishes, *, is_sketch: bool) -> Wash:
         """Return the paint, the look under it and the light of each lamp, averaged.

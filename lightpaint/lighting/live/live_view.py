@@ -129,6 +129,20 @@ class LiveView:
         """Return the picture of a lighting averaged to the film's size, linear. weights: (n, 3)."""
         return self.film(self._transform).mix(weights)
 
+    def draft(self, weights: Doubles) -> Floats:
+        """Return the same picture but for round-off, sooner if few lights have changed since the
+        last.
+        """
+        return self.film(self._transform).draft(weights)
+
+    def averaged(self, image: Floats) -> Floats:
+        """Return a picture (h, w, 3) averaged to the film's size."""
+        return self.film(self._transform).average(image)
+
+    def lights_at(self, row: int, column: int) -> Floats:
+        """Return the light of each lamp at unit emission, averaged around a pixel, (n, 3)."""
+        return self.film(self._transform).lights_at(row, column)
+
     def set_transform(self, transform: ViewTransform | None) -> None:
         """Set the view transform of the comparison."""
         if transform != self._transform:

@@ -1,6 +1,7 @@
 /** The painter in an element: pictures, tools and panels over a host that has the session. */
 
 import { html, render, useEffect, useState } from './vendor/preact.js';
+import { refreshProbe } from './ui/brush_cursor.js';
 import { ColourPanel } from './ui/colour_panel.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
@@ -102,6 +103,7 @@ function listen(app) {
   const { engine, session, store } = app;
   engine.on('message', (message) => session.receive(message));
   engine.on('frame', () => store.flush());
+  engine.on('probed', () => refreshProbe(engine, store));
   engine.on('loading', (loadProgress) => store.set({ loadProgress }));
   engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));
   engine.on('layers', () => store.set((ui) => layersUpdate(engine.layerState(), ui)));

@@ -16,8 +16,8 @@ from lightpaint.paint.protocol.answer_parts import (
 from lightpaint.paint.protocol.base import Event, Message, Request
 from lightpaint.paint.protocol.events import (
     Acknowledgement, AnswerChoices, AnswerUpdate, CanvasPatch, Closing, ConsoleState, DraggedPlane,
-    Failure, LookList, Notice, PictureData, PictureUpdate, PreviousAnswer, ReferenceList, Rig,
-    SelectionUpdate, SessionPending, SessionState, StepList,
+    Failure, LookList, MixedPicture, Notice, PictureData, PictureUpdate, PreviousAnswer,
+    ReferenceList, Rig, SelectionUpdate, SessionPending, SessionState, StepList,
 )
 from lightpaint.paint.protocol.light_requests import (
     AddLight, ConstrainLight, ConstrainLights, EstimatePlaces, MoveLights, PlaceLights, PointLight,
@@ -31,8 +31,8 @@ from lightpaint.paint.protocol.message_parts import (
 )
 from lightpaint.paint.protocol.painting_requests import (
     AddReference, ApplyPreset, ChangeLayers, ClearPainting, CompareLooks, CopyLook, DropLook,
-    DropReference, DropStroke, GoToStep, ImportLayers, ListSteps, LoadLook, LookLike, MixLooks,
-    Paint, Propose, Redo, RenameLook, SaveLook, Select, ShowPrevious, StartOver, Undo,
+    DropReference, DropStroke, GoToStep, ImportLayers, ListSteps, LoadLook, LookLike, MixLights,
+    MixLooks, Paint, Propose, Redo, RenameLook, SaveLook, Select, ShowPrevious, StartOver, Undo,
 )
 from lightpaint.paint.protocol.requests import (
     VERSION, BlackOut, ChangeSettings, DropRender, Explain, Export, Fetch, Hello, Observe, Preview,

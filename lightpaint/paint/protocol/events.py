@@ -207,6 +207,22 @@ class DraggedPlane(Event, kind="dragged"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class MixedPicture(Event, kind="mixed"):
+    """The picture of a lighting: the answer to `mix`, and unasked the exact one.
+
+    view, slot, number: as the request had them. step: between the pixels and rows. is_exact:
+    whether it is the sum of the planes, and no draft. data: (h, w, 3) float16.
+    """
+
+    view: int
+    slot: int
+    number: int
+    step: int
+    is_exact: bool
+    data: npt.NDArray[np.float16]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PictureData(Event, kind="fetched"):
     """A picture, as the array `data`: the answer to `fetch`.
 

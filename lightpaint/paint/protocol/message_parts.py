@@ -183,7 +183,9 @@ class ViewInfo:
 
     size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
     factor of the stored plane of each light. plane_size: height and width of these planes, whose
-    pixels are means over blocks of the view's if they are fewer, as of many lights.
+    pixels are means over blocks of the view's if they are fewer, as of many lights. has_mixes:
+    whether the lights are too many for a page to hold their planes: it shows pictures of that size
+    that the session mixes (`mix`).
     """
 
     name: str
@@ -191,6 +193,7 @@ class ViewInfo:
     objects: tuple[str, ...]
     scales: tuple[float, ...]
     plane_size: tuple[int, int]
+    has_mixes: bool = False
 
 
 #: Records of layers, which messages have as they are.

@@ -16,6 +16,10 @@ MAX_LISTED_STEPS = 10_000
 #: Maximum number of pairs of places that are compared with a reference.
 MAX_PAIRS = 20
 
+#: Number of pictures that a page has the session mix at a time, and the largest step between the
+#: pixels of a draft.
+MAX_MIX_SLOTS, MAX_MIX_STEP = 16, 8
+
 
 @dataclass(frozen=True)
 class Paint(Request, kind="paint"):
@@ -45,6 +49,33 @@ class Paint(Request, kind="paint"):
     def __post_init__(self) -> None:
         if self.stroke >= 2**53:  # largest exact integer of a page
             raise ValueError("stroke is a number below 2**53")
+
+
+@dataclass(frozen=True)
+class MixLights(Request, kind="mix"):
+    """Ask for the picture of a lighting, of a view with `has_mixes`; with the array `weights`
+    (lights, 3) float64. Answered by `mixed` with a draft; another `mixed` with the exact picture
+    follows unless `is_live`.
+
+    slot, number: the page's own, which `mixed` returns: another `mix` for a slot stops an exact
+    picture that is not there yet. is_clean: whether to denoise it. is_live: whether more changes
+    follow. step: between the pixels and rows of the draft.
+    """
+
+    request_buffers: ClassVar[Mapping[str, str]] = {"weights": "(lights, 3) float64"}
+
+    slot: int
+    number: int
+    view: int = 0
+    is_clean: bool = True
+    is_live: bool = False
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.slot < MAX_MIX_SLOTS:
+            raise ValueError(f"slot is 0 to {MAX_MIX_SLOTS - 1}")
+        if not 1 <= self.step <= MAX_MIX_STEP:
+            raise ValueError(f"step is 1 to {MAX_MIX_STEP}")
 
 
 @dataclass(frozen=True)

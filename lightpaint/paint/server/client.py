@@ -18,6 +18,7 @@ from lightpaint.paint.protocol import (
     Hello,
     LookList,
     Message,
+    MixedPicture,
     Paint,
     PictureUpdate,
     ProgressReport,
@@ -276,6 +277,8 @@ def _replacement_key(message: Message) -> tuple[Any, ...] | None:
         return "progress", message.task
     if isinstance(message, DraggedPlane):
         return message.kind, message.light, message.view
+    if isinstance(message, MixedPicture):
+        return message.kind, message.slot, message.view
     is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
     return (message.kind,) if is_newest else None
 

@@ -30,6 +30,13 @@ Picture = npt.NDArray[Any]
 #: Maximum number of values, lights times pixels, that a page has: 400 MB as half floats.
 MAX_PAGE_VALUES = 2**26
 
+#: Number of lights from which the session mixes pictures for pages, if their planes have very many
+#: values: then they hold no planes.
+MIN_MIXED_LIGHTS = 160
+
+#: Maximum number of pixels of pictures that the session mixes.
+MAX_MIXED_PIXELS = 2**20
+
 #: Number of values beyond which a session opens without smoothed or kept planes: these take a walk
 #: over all planes, and the page can be used meanwhile.
 MAX_OPENING_VALUES = 2**25
@@ -143,7 +150,8 @@ def page_factor(basis: Basis) -> int:
     basis: of the view, with every light at its place in the scene.
     """
     count, (height, width), factor = len(basis.lights), basis.size, 1
-    while count * (height // factor) * (width // factor) > MAX_PAGE_VALUES:
+    count, most = (1, MAX_MIXED_PIXELS) if has_mixes(basis) else (count, MAX_PAGE_VALUES)
+    while count * (height // factor) * (width // factor) > most:
         factor += 1
     return fitting_factor(basis.size, factor)
 
@@ -156,8 +164,19 @@ def opens_plain(basis: Basis) -> bool:
     return len(basis.lights) * basis.size[0] * basis.size[1] > MAX_OPENING_VALUES
 
 
+def has_mixes(basis: Basis) -> bool:
+    """Return whether the session mixes the pictures of a page, which has no planes.
+
+    basis: as in `page_factor`.
+    """
+    return opens_plain(basis) and len(basis.lights) >= MIN_MIXED_LIGHTS
+
+
 def plane_size(basis: Basis) -> tuple[int, int]:
-    """Return the height and width of the planes that a page has. basis: as in `page_factor`."""
+    """Return the height and width of the planes or mixes that a page has.
+
+    basis: as in `page_factor`.
+    """
     return blocks_in(basis.size, page_factor(basis))
 
 

@@ -32,6 +32,7 @@ from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     PictureTable,
+    has_mixes,
     opens_plain,
     page_emitters,
     page_plane,
@@ -128,6 +129,21 @@ def offer_presets(table: PictureTable, view: Canvas, transform: ViewTransform) -
     table.offer_family("preset", picture)
 
 
+def offer_lights_at(table: PictureTable, views: Canvases) -> None:
+    """Offer the light of each lamp around a pixel, as `lights_at/ROW,COLUMN@VIEW`, (n, 3): the
+    means over blocks that follow the brush.
+    """
+
+    def lights(name: str) -> Picture:
+        place, _, view = name.partition("@")
+        row, _, column = place.partition(",")
+        if not (row.isdecimal() and column.isdecimal() and (view or "0").isdecimal()):
+            raise PaintError(f"there is no picture {f'lights_at/{name}'[:40]!r}")
+        return views[int(view or 0)].live.lights_at(int(row), int(column))
+
+    table.offer_family("lights_at", lights)
+
+
 def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> None:
     """Offer the small pictures of the history's steps, as `step/12`."""
 
@@ -212,6 +228,7 @@ def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
         objects=() if objects is None else tuple(objects.names),
         scales=tuple(plane_scale(basis, k) for k in range(len(view.basis.lights))),
         plane_size=plane_size(basis),
+        has_mixes=has_mixes(basis),
     )
 
 

@@ -28,6 +28,7 @@ from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
+    has_mixes,
     opens_plain,
     page_emitters,
     page_factor,
@@ -37,6 +38,7 @@ from lightpaint.paint.session.picture_table import (
 )
 from lightpaint.paint.session.session_state import (
     offer_layers,
+    offer_lights_at,
     offer_presets,
     offer_references,
     offer_steps,
@@ -135,13 +137,14 @@ class PlaneDenoiser:
         ]
 
     def denoise(self, session: Session) -> None:
-        """Denoise the planes that are missing, one view after the other.
+        """Denoise the planes that pages have and that are missing, one view after the other.
 
         Of moved lights they are the planes of before, which undo brings back.
         """
         for view, basis in zip(session.views, session.bases, strict=True):
             planes_of_view = self._by_view.get(view.view)
-            if planes_of_view is None or not planes_of_view.matches(basis):
+            is_missing = planes_of_view is None or not planes_of_view.matches(basis)
+            if is_missing and not has_mixes(basis):
                 self._denoise_view(session, view, basis)
 
     def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
@@ -294,6 +297,7 @@ class SessionBases:
             offer_view(pictures, view, basis, session.transform, clean, small)
         offer_transforms(pictures, offered_transforms(session))
         offer_layers(pictures, session.views)
+        offer_lights_at(pictures, session.views)
         offer_presets(pictures, session.views[0], session.transform)
         offer_references(pictures, session.references)
         offer_steps(pictures, session.history.picture)

@@ -52,6 +52,7 @@ from lightpaint.paint.studio.exact_answers import (
     raise_outdated,
 )
 from lightpaint.paint.studio.file_imports import LayerImports, ReferenceImports
+from lightpaint.paint.studio.mixed_pictures import MixedPictures
 from lightpaint.paint.studio.plane_measurements import PlaneMeasurements
 from lightpaint.paint.studio.session_bases import BackgroundSampling, PlaneDenoiser, SessionBases
 from lightpaint.paint.studio.session_exports import FinalRenders
@@ -121,6 +122,7 @@ class Studio:
         )
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._comparison = LookComparison(links, self._mover)
+        self._mixes = MixedPictures(links)
         self._jobs = BackgroundJobs(links, self._mover, clean_planes=denoiser.clean_planes)
         self._shown_ground = 0  # number of the look under the painting that pages have
         self._layer_imports = LayerImports(links, self._exact_answers.notify)
@@ -179,6 +181,7 @@ class Studio:
         self._sampling.stop()
         self._mover.stop()
         self._comparison.stop()
+        self._mixes.stop()
         self._planes.stop()
         self._write_retry.stop()
         with self._access.lock:
@@ -276,6 +279,8 @@ class Studio:
                     return [replace(steps, searches=self._placer.notes.listed())]
                 case protocol.ShowPrevious():
                     return [PreviousAnswer(weights=session.history.previous_weights())]
+                case protocol.MixLights():
+                    return self._mixes.handle(message, arrays)
                 case protocol.CompareLooks():
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():

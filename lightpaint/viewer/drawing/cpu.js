@@ -137,7 +137,8 @@ export class CpuView {
 
   /** Return the step between the rows and columns that are mixed while the brush is down. */
   liveStep() {
-    const work = (this.planes.length * this.planeSize[0] * this.planeSize[1]) / BUDGET_VALUES;
+    const count = this.planes.filter(({ halves }) => halves).length;
+    const work = (count * this.planeSize[0] * this.planeSize[1]) / BUDGET_VALUES;
     const frames = Math.max(work, this.mixMs / FRAME_BUDGET_MS);
     return frames <= 1 ? 1 : frames <= 5 ? 2 : frames <= 9 ? 3 : 4;
   }

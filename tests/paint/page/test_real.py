@@ -25,7 +25,9 @@ from patience import PATIENCE_S
 from renderer import REPOSITORY
 
 import lightpaint as lp
+from lightpaint.basis import denoise_mix
 from lightpaint.cli.commands.paint_command import command_for_paintings
+from lightpaint.colour import LUMINANCE
 from lightpaint.colour.primaries import to_8_bit
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import encode_levels
@@ -33,6 +35,7 @@ from lightpaint.dmx.network.console_link import ConsoleLink
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.page_server import Server
+from lightpaint.paint.session import picture_table
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.console_switch import Console, drives_of_session
@@ -344,6 +347,62 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     assert user.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
     np.testing.assert_allclose(user.seen(5, 50, 1), user.code(user.paint), atol=1)
     np.testing.assert_allclose(user.seen(90, 50, 0), user.answered(90, 50), atol=1)
+
+
+@pytest.mark.parametrize("view", [nightly("cpu"), "gl"])
+def test_answers_of_many_lights_are_mixed_by_the_session(
+    subject: Subject,
+    basis: lp.Basis,
+    open_page: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    without_reasons: None,
+    view: str,
+) -> None:
+    """No plane is fetched: not for the answer, one light alone, nor the shares of all."""
+    monkeypatch.setattr(picture_table, "MIN_MIXED_LIGHTS", N)
+    monkeypatch.setattr(picture_table, "MAX_OPENING_VALUES", 0)
+    served = ServedPainter(subject)
+    try:
+        user = open_page(served, view).ready()
+        fetched: list[str] = []
+        user.page.on("request", lambda request: fetched.append(request.url))
+        before = user.seen(70, 40, 1)
+        user.press("0").stroke((20, 10), (40, 10)).still("brush")
+
+        def shows(weights: Any) -> None:
+            light = denoise_mix(basis, weights)
+            for x, y in ((30, 10), (70, 40)):
+                code = user.code(light[y, x])
+                wait_until(
+                    lambda x=x, y=y, code=code: abs(user.seen(x, y, 1) - code).max() <= 1,
+                    f"the answer at {x}, {y} is not on the screen",
+                )
+
+        weights = served.studio.session.weights
+        shows(weights)
+        assert user.seen(70, 40, 1) != before
+        # A light alone, as under a pointer on its row.
+        alone = np.zeros((N, 3))
+        alone[1] = weights[1]
+        user.page.locator(".light-thumb").nth(1).hover()
+        wait_until(lambda: user.look("return mirror.display.otherWeights"), "no light is alone")
+        gain = user.look("return mirror.display.otherWeights[1][0]") / weights[1, 0]
+        shows(gain * alone)
+        place = user.at(30, 10, 1)
+        user.page.mouse.move(*place)
+        script = "return engine.probe(30, 10).shares"
+        wait_until(lambda: sum(user.look(script)) > 0, "no shares")
+        around = (
+            basis.planes.plane(0)[10, 30] @ LUMINANCE,
+            basis.planes.plane(1)[10, 30] @ LUMINANCE,
+        )
+        shares = user.look(script)
+        expected = np.divide(*around) * (weights[0] @ LUMINANCE) / (weights[1] @ LUMINANCE)
+        np.testing.assert_allclose(shares[0] / shares[1], expected, rtol=0.1)
+        assert fetched
+        assert not [url for url in fetched if re.search("/data/(plane|clean)/", url)]
+    finally:
+        served.close()
 
 
 def fill_and_ask(user: PainterUser) -> None:

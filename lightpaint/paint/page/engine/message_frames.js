@@ -66,8 +66,8 @@ export function stateOfView(state, view) {
     ...light,
     scale: viewState.scales[k],
   }));
-  const { size, objects, plane_size: planeSize } = viewState;
-  return { ...state, lights, size, objects, planeSize };
+  const { size, objects, plane_size: planeSize, has_mixes: hasMixes } = viewState;
+  return { ...state, lights, size, objects, planeSize, hasMixes };
 }
 
 /** @type {Record<string, {new (buffer: ArrayBuffer, at: number, length: number): Data,

@@ -162,7 +162,10 @@ class PictureEngine extends Emitter {
     const place = this.pixelAt(x, y);
     const { canvas, state, weights } = this.mirror;
     if (!place || !this.screen.view || !canvas || !state) return null;
-    const light = this.screen.view.planesAt(...place).map((value, i) => value * weights[i]);
+    const planes = this.mirror.hasMixes
+      ? this.mirror.mixes.lightsAt(...place, () => this.emit('probed', {}))
+      : this.screen.view.planesAt(...place);
+    const light = planes?.map((value, i) => value * weights[i]) ?? new Float32Array(weights.length);
     const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
       Math.max(0, luminance(light.subarray(3 * k, 3 * k + 3))),
     );

@@ -2,6 +2,7 @@
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { SRGB } from '../../../viewer/drawing/view_transform.js';
 import { COMPARED_COUNT, showsPresent } from './picture_slots.js';
+import { MIX_SLOTS, OTHER_SLOT, SOLUTION_SLOT, WALL_SLOT, SessionMixes } from './session_mixes.js';
 
 /** @typedef {import("../../../viewer/drawing/view_transform.js").Lut} Lut */
 /** @typedef {import("./message_frames.js").Message} Message */
@@ -11,9 +12,10 @@ import { COMPARED_COUNT, showsPresent } from './picture_slots.js';
 /** @typedef {import("./picture_slots.js").Display} Display */
 
 export class PictureState {
-  /** @param {Screen} screen */
-  constructor(screen) {
+  /** @param {Screen} screen @param {import("./socket_host.js").Host} host */
+  constructor(screen, host) {
     this.screen = screen;
+    this.mixes = new SessionMixes(host, screen);
     /** The session's state of the current view. @type {Message | null} */
     this.state = null;
     /** @type {PaintCanvas | null} */
@@ -38,12 +40,23 @@ export class PictureState {
     return this.canvas;
   }
 
+  /** Whether the session mixes the pictures of lightings, and the view has no plane of a light. */
+  get hasMixes() {
+    return Boolean(this.state?.hasMixes);
+  }
+
+  /** Number of planes of the view before the planes of compared looks. */
+  get mixedCount() {
+    return this.hasMixes ? MIX_SLOTS : (this.state?.lights.length ?? 0);
+  }
+
   /** Weights that come with a message. @param {Message} message */
   takeWeights(message) {
     const { poses, added_lights: addedLights } = message;
     if (poses && addedLights)
       this.haveLightsMoved = Object.keys(poses).length + addedLights.length > 0;
     else if (poses) this.haveLightsMoved ||= Object.keys(poses).length > 0;
+    if (poses && this.hasMixes) this.mixes.renew();
     const weights = message.arrays?.weights?.data;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
@@ -58,17 +71,24 @@ export class PictureState {
     this.screen.view?.setLut(lut);
   }
 
-  /** Return the weights that a mix of all planes is shown with; null for none.
+  /** Return the weights that the planes of the view are shown with; null for none.
    * @param {'solution' | 'other'} kind */
   weightsOf(kind) {
+    const weights = this.lightWeights(kind);
+    return weights && this.forPlanes(weights, kind === 'other' ? OTHER_SLOT : SOLUTION_SLOT);
+  }
+
+  /** Return the weights that lights, and maybe compared looks, are shown with; null for none.
+   * @param {'solution' | 'other'} kind */
+  lightWeights(kind) {
     const {
       visibleLights = null,
       solutionWeights = null,
       otherWeights = null,
       master = 1,
     } = this.display ?? {};
-    if (kind === 'other') return otherWeights && this.forPlanes(otherWeights.flat());
-    const weights = this.forPlanes(solutionWeights?.flat() ?? this.outputWeights(master));
+    if (kind === 'other') return otherWeights && this.checked(otherWeights.flat());
+    const weights = this.checked(solutionWeights?.flat() ?? this.outputWeights(master));
     if (weights && visibleLights)
       weights.forEach(
         (weight, i) => (weights[i] = (visibleLights[Math.floor(i / 3)] ?? true) ? weight : 0),
@@ -80,17 +100,19 @@ export class PictureState {
   showWeights() {
     const { view } = this.screen;
     if (!view || !this.state) return;
+    const ofLights = this.lightWeights('solution');
+    if (ofLights) this.checkPresent(ofLights);
     const weights = this.weightsOf('solution');
     const otherMix = this.weightsOf('other');
     if (weights) view.setWeights(weights);
     if (otherMix) view.setWeights(otherMix, 'other');
-    if (weights) this.checkPresent(weights);
   }
 
   /** Tell the view which of the looks that are side by side it draws next; false for none.
    * @param {number} index */
   chooseLook(index) {
-    const weights = this.forPlanes(this.display?.lookMixes?.[index]?.flat() ?? []);
+    const ofLights = this.checked(this.display?.lookMixes?.[index]?.flat() ?? []);
+    const weights = ofLights && this.forPlanes(ofLights, WALL_SLOT + index);
     if (weights) this.screen.view?.setWeights(weights, 'other');
     return weights !== null;
   }
@@ -102,15 +124,33 @@ export class PictureState {
     return master === 1 ? weights : weights.map((x, i) => (isFixed(i) ? x : master * x));
   }
 
-  /** Return weights for all planes of the view, from the weights of the lights and maybe of compared
-   * looks; null for weights of other lights.
-   * @param {ArrayLike<number>} weights */
-  forPlanes(weights) {
+  /** Return a copy of the weights of lights, and maybe of compared looks; null for weights of other
+   * lights. @param {ArrayLike<number>} weights */
+  checked(weights) {
     const length = 3 * (this.state?.lights.length ?? 0);
     if (weights.length !== length && weights.length !== length + 3 * COMPARED_COUNT) return null;
+    return Float64Array.from(weights);
+  }
+
+  /** Return weights for all planes of the view. @param {Float64Array} weights of the lights and maybe
+   * of compared looks @param {number} slot of the mix that shows these lights, where there are mixes */
+  forPlanes(weights, slot) {
+    const length = 3 * (this.state?.lights.length ?? 0);
     const planeWeights = new Float64Array(3 * this.screen.count);
-    planeWeights.set(Array.from(weights).slice(0, planeWeights.length));
+    const looks = weights.subarray(length, length + planeWeights.length - 3 * this.mixedCount);
+    planeWeights.set(looks, 3 * this.mixedCount);
+    if (!this.hasMixes) planeWeights.set(weights.subarray(0, length));
+    else if (this.showMix(slot, weights.slice(0, length))) planeWeights.fill(1, 3 * slot, 3 * slot + 3);
     return planeWeights;
+  }
+
+  /** Show lights in a slot of mixes, unless they give the current look, which is here; return
+   * whether any is on. @param {number} slot @param {Float64Array} weights */
+  showMix(slot, weights) {
+    const isLit = weights.some((weight) => weight !== 0);
+    const isHere = slot === SOLUTION_SLOT && this.screen.isPresent;
+    if (isLit && !isHere) this.mixes.show(slot, weights);
+    return isLit;
   }
 
   /** Unchanged lights give the current look, which arrives before the planes and is denoised.

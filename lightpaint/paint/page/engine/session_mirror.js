@@ -10,6 +10,7 @@ import { lutOf } from '../../../viewer/drawing/lattice.js';
 import { SRGB } from '../../../viewer/drawing/view_transform.js';
 import { VERSION, nameInView, stateOfView } from './message_frames.js';
 import { COMPARED_COUNT, showsPresent, sizesText, wantedPictures } from './picture_slots.js';
+import { SOLUTION_SLOT } from './session_mixes.js';
 import { StrokeSender } from './stroke_sender.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
@@ -24,7 +25,7 @@ export class SessionMirror extends PictureState {
   /** @param {Host} host @param {Screen} screen
    * @param {(kind: string, event: any) => void} emit */
   constructor(host, screen, emit) {
-    super(screen);
+    super(screen, host);
     this.host = host;
     this.emit = emit;
     this.loader = new PictureLoader(
@@ -67,6 +68,8 @@ export class SessionMirror extends PictureState {
     host.on('renewed', ({ resources }) => {
       this.loader.addResources(resources);
       this.requestPictures();
+      const isOfLight = Object.keys(resources).some((name) => name.startsWith('plane/'));
+      if (this.hasMixes && isOfLight) this.mixes.renew();
     });
     host.on('dragged', (draft) => {
       const isShown = draft.view === this.view && this.loader.wantedNames.has(`plane ${draft.light}`);
@@ -86,6 +89,7 @@ export class SessionMirror extends PictureState {
     const isOther = state.is_back === false;
     if (isOther || !this.strokes?.isPending) this.layers.adopt(isOther);
     this.takeWeights(state);
+    if (this.hasMixes) this.mixes.renew();
     this.loader.begin(state.resources);
     this.requestPictures();
     if (this.loader.loadedVersions.has('present')) this.sync();
@@ -137,18 +141,19 @@ export class SessionMirror extends PictureState {
     this.isReady = false;
     this.knowsPresent = false;
     this.loader.forget();
+    this.mixes.forget();
     this.setLut(this.lut);
   }
 
   /** Number of planes of the view. */
   get planeCount() {
-    return (this.state?.lights.length ?? 0) + (this.hasLookPlanes ? COMPARED_COUNT : 0);
+    return this.mixedCount + (this.hasLookPlanes ? COMPARED_COUNT : 0);
   }
 
   /** The number of planes has changed: keep the painting and fetch all planes again. */
   setPlanes() {
     const { loader, screen } = this;
-    const count = this.state?.lights.length ?? 0;
+    const count = this.mixedCount;
     for (let k = count; k < screen.count; k++) loader.setWanted([[`plane ${k}`, null]]);
     screen.setCount(this.planeCount);
     this.refill();
@@ -240,7 +245,9 @@ export class SessionMirror extends PictureState {
   requestPictures() {
     const { state, display, loader, view } = this;
     if (!state) return;
-    const names = wantedPictures(state.lights.length, display, view, loader.resources);
+    const count = this.hasMixes ? 0 : state.lights.length;
+    const names = wantedPictures(count, display, view, loader.resources);
+    this.mixes.follow(view, display?.clean ?? true);
     const ground = this.layers.isPlain ? null : nameInView('ground', view);
     loader.setWanted([...names, ['ground', ground]]);
     if ((display?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
@@ -258,7 +265,7 @@ export class SessionMirror extends PictureState {
       if (light >= state.lights.length) return;
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
     } else if (slot.startsWith('look ')) {
-      const plane = state.lights.length + Number(slot.slice(5));
+      const plane = this.mixedCount + Number(slot.slice(5));
       if (plane < this.screen.count) view.setPlane(plane, /** @type {Uint16Array} */ (data), 1);
     } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
     else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
@@ -276,6 +283,9 @@ export class SessionMirror extends PictureState {
     if (!canvas || !state) return;
     canvas.setPresent(present);
     this.knowsPresent = true;
+    // The answer begins with it, and its own picture follows.
+    if (this.hasMixes && this.screen.planeSize.join() === this.screen.size.join())
+      this.screen.view?.setPlane(SOLUTION_SLOT, present.slice(), 1);
     this.showWeights();
     this.showPresent();
     if (!this.isReady && state.first) this.isReady = true;
@@ -286,6 +296,7 @@ export class SessionMirror extends PictureState {
   /** Set all pictures again, in a new view or one that has lost them. */
   refill() {
     this.setLut(this.lut);
+    this.mixes.forget();
     this.showWeights();
     this.showPresent();
     if (this.canvas) this.redraw([this.canvas.wholeRegion]);

@@ -35,7 +35,7 @@ import { t } from '../language/language.js';
 /** Requests that do not wait for pending strokes. */
 export const UNQUEUED = [
   ...['paint', 'drop_stroke', 'change_layers', 'select'],
-  ...['hello', 'take_over', 'fetch'],
+  ...['hello', 'take_over', 'fetch', 'mix'],
 ];
 
 /** Listeners by message kind: the part that all hosts share. */

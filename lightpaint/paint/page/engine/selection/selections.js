@@ -4,6 +4,7 @@ import { VALUES, toFloats } from '../../../../viewer/drawing/half_floats.js';
 import { Encoder } from '../../../../viewer/drawing/view_transform.js';
 import { feathered, grown, inverted, joined } from './mask_operations.js';
 import { FULL, ellipse, polygonMask, rectangle } from './polygon_mask.js';
+import { OTHER_SLOT, SOLUTION_SLOT } from '../session_mixes.js';
 import { SelectionMirror } from './selection_mirror.js';
 import { brightnessMask, colourMask, lightMask, objectMask } from './shown_masks.js';
 import { t } from '../../language/language.js';
@@ -182,6 +183,7 @@ export class Selections {
     }
     const weights = session.weightsOf(shown === 'other' ? 'other' : 'solution');
     if (!canvas || !weights) return null;
+    if (session.hasMixes) return session.mixes.lightOf(shown === 'other' ? OTHER_SLOT : SOLUTION_SLOT);
     const light = new Float32Array(canvas.image.length);
     for (let k = 0; k < weights.length / 3; k++) {
       const rgb = weights.subarray(3 * k, 3 * k + 3);
@@ -196,9 +198,10 @@ export class Selections {
   /** Return the picture of a light alone, (h, w, 3) halves. @param {number} light
    * @returns {Promise<Uint16Array | null>} */
   async planeOf(light) {
-    const { host, loader, state } = this.session;
+    const { hasMixes, host, loader, state, view } = this.session;
     const slot = light < (state?.lights.length ?? 0) ? `plane ${light}` : null;
-    const name = slot && loader.wantedNames.get(slot);
+    const wanted = hasMixes ? nameInView(`plane/${light}`, view) : loader.wantedNames.get(slot ?? '');
+    const name = slot && wanted;
     if (!name) return null;
     return /** @type {Uint16Array} */ ((await host.fetch(name)).data);
   }

@@ -1,0 +1,166 @@
+/**
+ * Pictures of lightings that the session mixes, where the lights are too many for a page to hold
+ * their planes.
+ *
+ * Each slot of the view's planes shows one lighting. Drafts come at once, one in flight for each
+ * slot; the exact picture comes after a pause without changes.
+ */
+import { nameInView, repeatPixels } from './message_frames.js';
+import { toFloats } from '../../../viewer/drawing/half_floats.js';
+import { COMPARED_COUNT } from './picture_slots.js';
+
+/** @typedef {import("./message_frames.js").Message} Message */
+/** @typedef {import("./picture_canvas.js").Screen} Screen */
+/** @typedef {import("./socket_host.js").Host} Host */
+/** number: of the last request. isBusy: whether a draft is in flight; isNew: whether the next has
+ * been asked for. halves: its picture, of the planes' size.
+ * @typedef {{weights: Float64Array, number: number, isBusy: boolean, isNew: boolean,
+ *   halves: Uint16Array | null, timer: ReturnType<typeof setTimeout> | undefined}} Slot */
+
+/** Slots of the two pictures, the first of the slots of looks that are side by side, and their
+ * number. */
+export const SOLUTION_SLOT = 0;
+export const OTHER_SLOT = 1;
+export const WALL_SLOT = 2;
+export const MIX_SLOTS = WALL_SLOT + COMPARED_COUNT;
+
+/** Milliseconds without changes before the exact picture is asked for. */
+const PAUSE_MS = 180;
+
+/** Number of pixels beyond which drafts have every second one. */
+const MAX_DRAFT_PIXELS = 2 ** 18;
+
+export class SessionMixes {
+  /** @param {Host} host @param {Screen} screen */
+  constructor(host, screen) {
+    this.host = host;
+    this.screen = screen;
+    this.view = 0;
+    this.isClean = true;
+    /** @type {Map<number, Slot>} */
+    this.slots = new Map();
+    this.number = 0;
+    /** The last that `lightsAt` has fetched. @type {{name: string, values: Float32Array} | null} */
+    this.lights = null;
+    this.isFetching = false;
+    host.on('mixed', (message) => this.take(message));
+  }
+
+  /** Show a lighting in a slot. @param {number} index @param {Float64Array} weights (n, 3) */
+  show(index, weights) {
+    const known = this.slots.get(index);
+    if (known && isSame(known.weights, weights)) return;
+    const slot = known ?? { weights, number: 0, isBusy: false, isNew: true, halves: null, timer: undefined };
+    this.slots.set(index, slot);
+    slot.weights = weights;
+    this.ask(index, slot);
+  }
+
+  /** Ask for the pictures of all slots again, since planes have changed. */
+  renew() {
+    for (const [index, slot] of this.slots) this.ask(index, slot);
+  }
+
+  /** Show a view of the session. @param {number} view @param {boolean} isClean */
+  follow(view, isClean) {
+    if (view === this.view && isClean === this.isClean) return;
+    Object.assign(this, { view, isClean });
+    this.renew();
+  }
+
+  /** Forget all lightings, whose pictures the view has lost. */
+  forget() {
+    for (const { timer } of this.slots.values()) clearTimeout(timer);
+    this.slots.clear();
+  }
+
+  /** @param {number} index @param {Slot} slot */
+  ask(index, slot) {
+    slot.isNew = true;
+    slot.number = ++this.number;
+    clearTimeout(slot.timer);
+    slot.timer = setTimeout(() => this.askForExact(index, slot), PAUSE_MS);
+    if (!slot.isBusy) void this.askForDrafts(index, slot);
+  }
+
+  /** @param {number} index @param {Slot} slot */
+  async askForDrafts(index, slot) {
+    slot.isBusy = true;
+    while (slot.isNew && this.slots.get(index) === slot) {
+      slot.isNew = false;
+      await this.send(index, slot, true).catch(() => {});
+    }
+    slot.isBusy = false;
+  }
+
+  /** Ask for the exact picture, once no brush is down. @param {number} index @param {Slot} slot */
+  askForExact(index, slot) {
+    if (this.slots.get(index) !== slot) return;
+    if (this.screen.isBrushDown || this.screen.draftStep !== null)
+      slot.timer = setTimeout(() => this.askForExact(index, slot), PAUSE_MS);
+    else this.send(index, slot, false).catch(() => {});
+  }
+
+  /** @param {number} index @param {Slot} slot @param {boolean} isLive */
+  send(index, { weights, number }, isLive) {
+    const { view, isClean, screen } = this;
+    const [height, width] = screen.planeSize;
+    const step = isLive && height * width > MAX_DRAFT_PIXELS ? 2 : 1;
+    const fields = { slot: index, number, view, is_clean: isClean, is_live: isLive, step };
+    return this.host.send('mix', fields, {
+      weights: { data: weights, shape: [weights.length / 3, 3] },
+    });
+  }
+
+  /** @param {Message} message */
+  take({ view, slot: index, number, step, is_exact: isExact, arrays }) {
+    const slot = this.slots.get(index);
+    const isWanted = slot && view === this.view && index < this.screen.count;
+    // A draft of a moment ago is better than none; an exact picture is of the present lighting.
+    if (!isWanted || (isExact && number !== slot.number)) return;
+    slot.halves = repeatPixels(arrays.data, step, this.screen.planeSize);
+    this.screen.view?.setPlane(index, slot.halves, 1);
+    this.screen.requestDraw(!isExact);
+  }
+
+  /** Return the light of the picture in a slot, (h, w, 3) of the view's size, by the nearest pixel;
+   * null if there is none yet. @param {number} index */
+  lightOf(index) {
+    const halves = this.slots.get(index)?.halves;
+    if (!halves) return null;
+    const [[height, width], [rows, columns]] = [this.screen.size, this.screen.planeSize];
+    if (rows === height && columns === width) return toFloats(halves);
+    const light = new Float32Array(3 * height * width);
+    const small = toFloats(halves);
+    for (let p = 0; p < height * width; p++) {
+      const row = Math.floor((Math.floor(p / width) * rows) / height);
+      const at = 3 * (row * columns + Math.floor(((p % width) * columns) / width));
+      light.set(small.subarray(at, at + 3), 3 * p);
+    }
+    return light;
+  }
+
+  /** Return the light of each lamp around a pixel, (n, 3); null until it is here, when `onArrival`
+   * is called. @param {number} x @param {number} y @param {() => void} onArrival */
+  lightsAt(x, y, onArrival) {
+    const name = nameInView(`lights_at/${y},${x}`, this.view);
+    if (this.lights?.name === name) return this.lights.values;
+    if (!this.isFetching) {
+      this.isFetching = true;
+      void this.host
+        .fetch(name)
+        .then(({ data }) => (this.lights = { name, values: /** @type {Float32Array} */ (data) }))
+        .catch(() => null)
+        .then((lights) => {
+          this.isFetching = false;
+          if (lights) onArrival();
+        });
+    }
+    return null;
+  }
+}
+
+/** @param {Float64Array} a @param {Float64Array} b */
+function isSame(a, b) {
+  return a.length === b.length && a.every((x, k) => x === b[k]);
+}

@@ -1,0 +1,113 @@
+"""Pictures of lightings for pages without planes: drafts at once, exact ones while lights rest."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from threading import Lock
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis import Basis, as_halves, denoise_mix
+from lightpaint.images import block_mean, denoised
+from lightpaint.paint.background_threads import LatestWork
+from lightpaint.paint.protocol import Message, MixedPicture, MixLights
+from lightpaint.paint.session.draft_pictures import DraftPictures, checked_weights
+from lightpaint.paint.session.picture_table import Picture, page_factor
+from lightpaint.paint.session_access import StudioLinks
+from lightpaint.paint.studio.exact_answers import OutdatedError
+from lightpaint.progress import cancellable
+
+
+@dataclass(frozen=True, eq=False)
+class _Mix:
+    """A picture that a page asks for. weights: (n, 3), of the lights of `basis`."""
+
+    request: MixLights
+    basis: Basis
+    weights: Doubles
+
+    def picture(self) -> Picture:
+        """Return all pixels, as a page has them, (h, w, 3) float16."""
+        basis, weights = self.basis, self.weights
+        if not self.request.is_clean:
+            mixed = basis.planes.mix(weights)
+        elif basis.former is None:
+            mixed = denoise_mix(basis, weights)
+        else:
+            mixed = denoised(basis.planes.mix(weights), basis.features)
+        return as_halves(block_mean(mixed, page_factor(basis)))
+
+
+class MixedPictures:
+    """The pictures that the page of a studio asks for."""
+
+    def __init__(self, links: StudioLinks) -> None:
+        self._access, self._publisher, self._threads = links
+        self._drafts: dict[int, DraftPictures] = {}  # by view
+        self._lock = Lock()
+        self._wanted: dict[tuple[int, int], _Mix] = {}  # by view and slot
+        self._work = LatestWork(self._mix_wanted, self._publisher.publish)
+        self._is_working = False
+        self.stop = self._work.stop
+
+    def handle(self, message: MixLights, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
+        """Return a draft, and make the exact picture unless more changes follow.
+
+        Raises PaintError for weights of other lights.
+        """
+        view = self._access.session.views[message.view]
+        weights, key = checked_weights(view.basis, arrays), (message.view, message.slot)
+        with self._lock:
+            self._wanted.pop(key, None)
+            if not message.is_live:
+                self._wanted[key] = _Mix(message, view.basis, weights)
+        if not message.is_live:
+            self._begin()
+        drafts = self._drafts.setdefault(message.view, DraftPictures())
+        return [_answer(message, drafts.picture(view, weights, message.step), step=message.step)]
+
+    def _begin(self) -> None:
+        """Have the thread look at what is wanted, and start it for the first."""
+        if not self._is_working:
+            self._is_working = True
+            self._threads.start_low_priority(self._work.run, "mixes")
+        self._work.give(self._wanted)
+
+    def _mix_wanted(self, wanted: dict[tuple[int, int], _Mix]) -> None:
+        """Publish the exact pictures that are wanted, until there are none."""
+        while wanted:
+            with self._lock:
+                key, mix = next(iter(wanted.items()), (None, None))
+            if key is None or mix is None:
+                return
+
+            def check(key: tuple[int, int] = key, mix: _Mix = mix) -> None:
+                if wanted.get(key) is not mix or not self._publisher.is_open:
+                    raise OutdatedError
+
+            with suppress(OutdatedError), cancellable(check):
+                picture = mix.picture()
+                check()
+                self._publisher.publish_made(
+                    partial(_answer, mix.request, picture, step=1, is_exact=True)
+                )
+            with self._lock:
+                if wanted.get(key) is mix:
+                    del wanted[key]
+
+
+def _answer(
+    request: MixLights, picture: npt.NDArray[np.float16], *, step: int, is_exact: bool = False
+) -> MixedPicture:
+    return MixedPicture(
+        view=request.view,
+        slot=request.slot,
+        number=request.number,
+        step=step,
+        is_exact=is_exact,
+        data=picture,
+    )
