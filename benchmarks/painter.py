@@ -15,8 +15,11 @@ of a stroke is timed in this process. Up to a frame of the display, 16.7 ms, of 
 waiting for it. With --minutes, how the memory of page and server grows while somebody paints.
 
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
-with what that has kept, from the start of its process, and its largest resident memory until then.
-The browser is open already. SCENE may be a saved basis.
+with what that has kept, from the start of its process, until a first stroke is answered; the
+largest resident memories of the painter and of a process of the browser until then; and the median
+from pointer to screen in the next stroke. The browser is open already. SCENE may be a saved basis.
+With --exact, also the time from the end of that stroke until the exact answer and its analysis are
+found, and the painter's memory after them.
 
 With --moves, the same while a light of the scene is dragged at 960x540, from the move of the
 pointer until its picture is drawn: its plane along frozen paths, the lights solved around it.
@@ -101,7 +104,8 @@ WATCH = """() => {
 
 #: Whether all planes have been made anew without grain, and are there.
 CLEAN = """() => {
-  const { loader } = document.getElementById('lightpaint').painter.engine.mirror;
+  const { loader, hasMixes } = document.getElementById('lightpaint').painter.engine.mirror;
+  if (hasMixes) return true;
   const clean = Object.entries(loader.resources).filter(([name]) => name.startsWith('clean/'));
   return clean.length && clean.every(([, count]) => count > 0) && !loader.missingSlots().length;
 }"""
@@ -118,6 +122,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0)
     parser.add_argument("--start", metavar="SCENE")
     parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--exact", action="store_true", help="with --start: wait for the answer")
     parser.add_argument("--layers", type=int, metavar="N")
     parser.add_argument("--session", action="store_true", help="with --layers: without pages")
     parser.add_argument("--answers", action="store_true")
@@ -134,7 +139,7 @@ def main() -> None:
         print_many(options.many)
         return
     if options.start:
-        print_starts(options.start, options.times)
+        print_starts(options.start, options.times, with_exact=options.exact)
         return
     cases = [tuple(map(int, case.split("x"))) for case in options.cases]
     if options.layers:
@@ -537,6 +542,32 @@ def largest_gb(pid: int) -> float:
     return int(status.partition("VmHWM:")[2].split()[0]) * 1024 / 1e9
 
 
+def largest_page_gb() -> float:
+    """Largest resident memory so far of a page of this program's browsers, in GB."""
+    parents = {
+        int(path.parent.name): int(path.read_text().rpartition(")")[2].split()[1])
+        for path in Path("/proc").glob("[0-9]*/stat")
+    }
+    pages, found = set[int](), {os.getpid()}
+    while found:
+        found = {pid for pid, parent in parents.items() if parent in found}
+        pages |= {x for x in found if b"type=renderer" in Path(f"/proc/{x}/cmdline").read_bytes()}
+    return max(map(largest_gb, pages))
+
+
+def median_ms(page: Page, place: Sequence[float], moves: int = 90) -> float:
+    """Milliseconds from pointer to screen in a stroke around a place, the median."""
+    page.evaluate(WATCH)
+    page.mouse.move(*place)
+    page.mouse.down()
+    begin = time.perf_counter()
+    for k in range(1, moves + 1):
+        page.mouse.move(place[0] + 60 * np.sin(k / 14), place[1] + 30 * np.sin(k / 9))
+        time.sleep(max(0, begin + k / 60 - time.perf_counter()))
+    page.mouse.up()
+    return float(np.median(page.evaluate("() => window.times")))
+
+
 def is_saved(scene: str) -> bool:
     """Whether what is painted is a saved basis, of which no planes are kept."""
     return scene.endswith(".exr")
@@ -559,7 +590,7 @@ def answer_of(asking: HTTPConnection, path: str, key: str) -> bytes:
     return asking.getresponse().read()
 
 
-def print_starts(scene: str, times: int) -> None:
+def print_starts(scene: str, times: int, *, with_exact: bool = False) -> None:
     """How soon a stroke is answered after the start of a process, with and without a cache."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = shutil.which("chromium")
@@ -572,12 +603,14 @@ def print_starts(scene: str, times: int) -> None:
         }
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
         print(f"{scene}: s from the start of its process, and s of the processor that it took")
-        heads = ("", "address", *STAGES, "stroke", "processor", "GB")
+        heads = ("", "address", *STAGES, "stroke", "processor", "GB", "page, GB", "ms")
+        heads += ("exact", "GB") if with_exact else ()
         print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
-        print_times("nothing kept", [started(browser, scene, folder, environment, is_first=True)])
+        run = partial(started, browser, scene, folder, environment, with_exact=with_exact)
+        print_times("nothing kept", [run(is_first=True)])
         every = []
         for _ in range(times):
-            every.append(started(browser, scene, folder, environment))
+            every.append(run())
             print_times("kept", every[-1:])
         print_times("median", every)
         browser.close()
@@ -589,9 +622,17 @@ def print_times(name: str, every: list[list[float]]) -> None:
 
 
 def started(
-    browser: Any, scene: str, folder: str, environment: dict[str, str], *, is_first: bool = False
+    browser: Any,
+    scene: str,
+    folder: str,
+    environment: dict[str, str],
+    *,
+    is_first: bool = False,
+    with_exact: bool = False,
 ) -> list[float]:
-    """Seconds to each stage. is_first: wait at the end until all that can be kept is."""
+    """Seconds to each stage, and the figures after it. is_first: wait at the end until all that can
+    be kept is.
+    """
     place = tempfile.mkdtemp(dir=folder)
     words = [sys.executable, "-m", "lightpaint", "paint", scene, "-o", place]
     page = browser.new_context(viewport={"width": 1600, "height": 900}).new_page()
@@ -619,7 +660,12 @@ def started(
     page.wait_for_function(f"() => {PAINTER}.engine.mirror.strokes.count && {PAINTER}.engine.mirror"
                            ".strokes.isPending === false", timeout=60_000)  # fmt: skip
     times.append(time.perf_counter() - begin)
-    times += [cpu_seconds(painter.pid), largest_gb(painter.pid)]
+    times += [cpu_seconds(painter.pid), largest_gb(painter.pid), largest_page_gb()]
+    times.append(median_ms(page, box))
+    if with_exact:
+        begin = time.perf_counter()
+        wait_until_idle(painter.pid)
+        times += [time.perf_counter() - begin, largest_gb(painter.pid)]
     if is_first:
         until, kept = time.monotonic() + 600, "*.opening.npz" if is_saved(scene) else "*.clean.npz"
         while not list(Path(folder).glob(kept)) and time.monotonic() < until:
