@@ -30,6 +30,8 @@ export class PictureState {
     /** Whether the current look exists, and whether the view has it. */
     this.knowsPresent = false;
     this.hasPresent = false;
+    /** Whether the solution is the current look, which may be on its way. */
+    this.isLookNow = false;
     /** Whether a stroke is in progress. */
     this.isPainting = false;
   }
@@ -144,12 +146,11 @@ export class PictureState {
     return planeWeights;
   }
 
-  /** Show lights in a slot of mixes, unless they give the current look, which is here; return
-   * whether any is on. @param {number} slot @param {Float64Array} weights */
+  /** Show lights in a slot of mixes, unless they give the current look; return whether any is on. @param {number} slot @param {Float64Array} weights */
   showMix(slot, weights) {
     const isLit = weights.some((weight) => weight !== 0);
-    const isHere = slot === SOLUTION_SLOT && this.screen.isPresent;
-    if (isLit && !isHere) this.mixes.show(slot, weights);
+    const isLook = slot === SOLUTION_SLOT && this.isLookNow;
+    if (isLit && !isLook) this.mixes.show(slot, weights);
     return isLit;
   }
 
@@ -166,6 +167,7 @@ export class PictureState {
       weights.every(
         (weight, i) => Math.abs(weight - (present[i] ?? 0)) <= 1e-9 * (present[i] ?? 0),
       );
+    this.isLookNow = isPresent;
     screen.isPresent = isPresent && this.knowsPresent;
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
   }
