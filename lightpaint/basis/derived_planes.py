@@ -12,9 +12,12 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.file import file_planes
+from lightpaint.basis.file.deferred_planes import loaded
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.lit_planes import LitPlanes
 from lightpaint.basis.planes import BLOCK_PIXELS, MemoryPlanes, Planes
 from lightpaint.images import block_sums
+from lightpaint.progress import with_progress
 
 #: Number of rows of pixels averaged at a time: one chunk of a compressed file.
 READ_ROWS = 16
@@ -125,8 +128,13 @@ class BlockPlanes(RowPlanes):
         top, bottom = max(top, 0), min(bottom, self.size[0])
         blocks = np.empty((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
         step = max(1, READ_ROWS // self._side)
-        for first in range(top, bottom, step):
+        whole = loaded(self._whole)
+        for first in with_progress(range(top, bottom, step), "strips"):
             end = min(first + step, bottom)
+            if isinstance(whole, LitPlanes):
+                sums = whole.block_sums(self._weight, self._side, first, end)
+                blocks[:, first - top : end - top] = sums / self._total[first:end]
+                continue
             source_rows = self._whole.rows(first * self._side, end * self._side)
             for means, plane in zip(blocks, source_rows, strict=True):
                 means[first - top : end - top] = self._means(plane, first, end)

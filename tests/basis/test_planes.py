@@ -22,7 +22,7 @@ from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means,
 from lightpaint.basis.file import basis_file, file_planes, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
 from lightpaint.basis.file.half_floats import EncodedPlanes
-from lightpaint.basis.file.lit_planes import LitPlanes
+from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
@@ -317,6 +317,38 @@ def test_means_over_blocks_are_the_same_wherever_planes_lie(
     monkeypatch.setattr(BlockPlanes, "rows", None)  # which a few blocks do not take
     expected_few = in_memory.pixels(few)
     assert on_request.pixels(few).tobytes() == expected_few.tobytes()
+
+
+@pytest.mark.parametrize("strip_rows", [1, 3, 7])
+@pytest.mark.parametrize("side", [1, 2, 4])
+@pytest.mark.parametrize("outside", [0, 1])
+def test_means_of_lit_pixels_are_those_of_all_pixels(
+    monkeypatch: pytest.MonkeyPatch, strip_rows: int, side: int, outside: int
+) -> None:
+    """Whatever strips they are kept in, with one plane that is kept whole, and one in units of its
+    own.
+    """
+    rng = np.random.default_rng(11)
+    images = rng.random((4, *SIZE, 3), np.float32) * (rng.random((4, *SIZE, 1)) < 0.4)
+    images = images.astype(np.float16).astype(np.float32)
+    weight = rng.random((SIZE[0] - outside, SIZE[1] - outside))
+    weight[:3, :2] = 0
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", 1)
+    monkeypatch.setattr(LitPlanes, "chunk_rows", strip_rows)
+    stored = [LitPlane.of(np.moveaxis(x.astype(np.float16), -1, 0), 1.0) for x in images]
+    stored[1] = replace(stored[1], scale=4.0)
+    stored[2] = LitPlane.of(np.moveaxis(images[2], -1, 0), 1.0)
+    lit = LitPlanes(stored, SIZE)
+    assert lit.strip_rows == strip_rows
+    np.testing.assert_array_equal(lit.plane(2), images[2])
+    images[1] *= 4
+    expected = block_means(MemoryPlanes(images), weight, side).array()
+    for limit in (2**27, 0):  # in memory, and on request
+        monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", limit)
+        means = block_means(lit, weight, side)
+        assert isinstance(means, BlockPlanes) == (limit == 0)
+        np.testing.assert_allclose(means.array(), expected, rtol=1e-6)
+        np.testing.assert_allclose(means.rows(1, 2), expected[:, 1:2], rtol=1e-6)
 
 
 def test_no_more_rows_are_averaged_at_a_time_than_a_chunk_has(

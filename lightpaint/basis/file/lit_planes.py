@@ -24,6 +24,7 @@ from lightpaint.arrays import (
 )
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 from lightpaint.basis.planes import LitEntries
+from lightpaint.images import block_sums
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
@@ -156,6 +157,19 @@ class _LitStrip:
             lights, its_columns = lights[has_column], its_columns[has_column]
             numbers = numbers[:, has_column]
         return lights, its_columns, as_singles(numbers)
+
+    def sums_of_groups(self, groups: Indices, weight: Doubles, count: int) -> Doubles:
+        """Return Σ of weighted numbers over each group of pixels, (3, n, count) float64.
+
+        groups: (pixels,), the group of each pixel. weight: (pixels,).
+        """
+        n, weights = len(self.begins) - 1, weight[self.lit]
+        places = self.of_planes(count * np.arange(n)) + groups[self.lit]
+        sums = [
+            np.bincount(places, _singles(channel) * weights, minlength=n * count)
+            for channel in self.numbers
+        ]
+        return np.reshape(sums, (3, n, count))
 
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
@@ -325,6 +339,38 @@ class LitPlanes(RowPlanes):
             totals[i] = plane.sum(axis=1, dtype=np.float64)
         scales = self._scales.astype(np.float64)[:, None]
         return power * np.square(scales), totals * scales
+
+    def block_sums(self, weight: Doubles, side: int, top: int, bottom: int) -> Doubles:
+        """Return weighted sums over rows `top` to `bottom` of blocks of side × side pixels, (n,
+        rows, columns, 3).
+
+        weight: (h', w'), of pixels from the top left corner on; others are in no block. Smaller
+        blocks are at its right and bottom edges.
+        """
+        (height, width), columns = weight.shape, -(-weight.shape[1] // side)
+        sums = np.zeros((3, self._count, bottom - top, columns))
+        first, last = top * side, min(bottom * side, height)
+        weights = np.zeros(self._size)
+        weights[first:last, :width] = weight[first:last]
+        row, column = np.indices((self.strip_rows, self._size[1])).reshape(2, -1)
+        # Pixels outside have no weight, whatever their block.
+        column = np.minimum(column // side, columns - 1)
+        step = self.strip_rows
+        for k in with_progress(range(first // step, -(-last // step)), "strips"):
+            strip = self._lit[k]
+            begin = max(k * step // side - top, 0)  # of the blocks that it touches
+            end = min(-(-(k * step + step) // side) - top, bottom - top)
+            of_block = np.clip((row + k * step) // side - top, begin, end - 1) - begin
+            groups = (of_block * columns + column)[: strip.size]
+            start = k * step * self._size[1]
+            of_strip = weights.ravel()[start : start + strip.size]
+            found = strip.sums_of_groups(groups, of_strip, (end - begin) * columns)
+            sums[:, :, begin:end] += found.reshape(3, self._count, end - begin, columns)
+        for i, plane in self._clean.items():
+            channels = plane.reshape(3, *self._size)[:, first:last, :width] * weight[first:last]
+            sums[:, i] = [block_sums(channel, side) for channel in channels]
+        scaled: Doubles = sums.transpose(1, 2, 3, 0) * self._scales[:, None, None, None]
+        return scaled
 
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only."""
