@@ -173,6 +173,8 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
         if answer.are_ignored:
             return f"{text}."
+        if not answer.is_reached(wish.plane):
+            return f"{text}: none of the lamps that the answer adjusts reaches it."
         if (limit := answer.binding_limit) is not None:
             return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:

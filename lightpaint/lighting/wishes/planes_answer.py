@@ -50,11 +50,11 @@ class PlanesAnswer:
 
     outcomes: of all wishes. watts: the power of all lamps; None if the power of one is unknown.
     floor_m2: the area that it is divided by; 0 without one. all_at_full: whether no lamp could give
-    more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
-    to the painting beyond the distance of an answer without wishes; None without a painting.
-    budget_delta_e: the same beyond one whose power is not limited, where the limit binds. glare:
-    that observers see; None if it was not measured. are_ignored: whether the answer was found
-    without the wishes.
+    more. lamps: their number, without those that stay as they are. adjusted: the lights, by number,
+    that belong to these. cost_delta_e: the mean CIEDE2000 to the painting beyond the distance of an
+    answer without wishes; None without a painting. budget_delta_e: the same beyond one whose power
+    is not limited, where the limit binds. glare: that observers see; None if it was not measured.
+    are_ignored: whether the answer was found without the wishes.
     """
 
     wished: WishedLight
@@ -64,6 +64,7 @@ class PlanesAnswer:
     floor_m2: float
     all_at_full: bool
     lamps: int
+    adjusted: tuple[int, ...]
     cost_delta_e: float | None = None
     budget_delta_e: float | None = None
     glare: Glare | None = None
@@ -120,6 +121,11 @@ class PlanesAnswer:
                 best = found if best is None else min(best, found)
         return best
 
+    def is_reached(self, plane: str) -> bool:
+        """Return whether any lamp that the answer adjusts lights a plane."""
+        illuminance = self.wished.illuminance
+        return bool(illuminance.matrix[illuminance.points_of(plane)][:, list(self.adjusted)].any())
+
     @property
     def missed(self) -> tuple[WishOutcome, ...]:
         """The wishes that are not met."""
@@ -152,7 +158,7 @@ def planes_answer(
         for k, wish in enumerate(wished.wishes)
     )
     lights = wished.illuminance.lights
-    movable = {lights[k].lamp or lights[k].name for x in reduction.knobs for k in x.lights}
+    adjusted = tuple(sorted({k for knob in reduction.knobs for k in knob.lights}))
     return PlanesAnswer(
         wished,
         weights,
@@ -160,7 +166,8 @@ def planes_answer(
         watts,
         floor_m2,
         _is_all_at_full(reduction, weights),
-        len(movable),
+        len({lights[k].lamp or lights[k].name for k in adjusted}),
+        adjusted,
         glare=glare,
         are_ignored=are_ignored,
     )

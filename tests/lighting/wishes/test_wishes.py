@@ -32,6 +32,7 @@ from lightpaint.photometry.illuminance import (
     Ratio,
     Wishes,
 )
+from lightpaint.report.planes_text import planes_sentences
 from lightpaint.target.painted_target import Target
 
 #: Rows are met up to 1e-9 of their size, and the oracles have tolerances of their own.
@@ -239,3 +240,22 @@ def test_cases_are_of_lights_that_stay(make_basis, factors, message):
     reduction = reduce_to(_lamps(LAMPS), basis.lights)
     with pytest.raises(ConstraintError, match=message):
         wished_light(illuminance, PowerBudget(), reduction, cases=[LightCase("night", factors)])
+
+
+def test_a_plane_that_only_fixed_lights_reach_is_named(make_basis):
+    """The light of the sky is no light of lamps, and no other wish keeps these from giving more."""
+    basis, _, illuminance = _case(make_basis, [_plane("desk", 4, mean=400.0)])
+    only_fixed = illuminance.matrix.copy()
+    only_fixed[:, :3] = 0
+    constraints = _lamps(3).and_then(Constraints.of({"light 3": {"lock": True}}))
+    reduction = reduce_to(constraints, basis.lights)
+    wished = wished_light(replace(illuminance, matrix=only_fixed), PowerBudget(), reduction)
+    reduction = reduction.with_requirements(wished.requirements)
+    weights = reduction.weights(least_watts(wished, reduction).x)
+    answer = planes_answer(wished, reduction, weights, floor_m2=0.0)
+    lux = answer.readings["", "desk"].mean
+    assert 0 < lux < 400
+    [missed] = (x for x in planes_sentences(answer) if x.startswith("desk"))
+    assert missed == (
+        f"desk: {lux:.0f} of 400 lx: none of the lamps that the answer adjusts reaches it."
+    )
