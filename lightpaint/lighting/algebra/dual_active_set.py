@@ -36,7 +36,7 @@ NEARNESS, MAX_PULLS = 1e-8, 30
 CLOSE, JOINING = 1e-10, 16
 
 #: Distance of a sum from what it has to reach, relative to its size, at which an answer meets it.
-MET = 1e-8
+MET = 1e-6
 
 #: Violations of bounds and multipliers that are round-off, relative to the largest unknown and b.
 ROUND_OFF = 1e-12
