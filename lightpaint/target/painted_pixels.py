@@ -19,7 +19,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Floats, largest
 from lightpaint.colour import to_8_bit
 from lightpaint.errors import SizeError
-from lightpaint.images import Picture, block_mean, box_mean, resampled
+from lightpaint.images import Picture, block_mean, box_mean, grown, resampled
 from lightpaint.images.formats import without_pillow_warnings
 from lightpaint.sentences import Hint
 from lightpaint.target.template import Template
@@ -209,16 +209,5 @@ class TargetPixels(NamedTuple):
 
 def _patches(mask: Bools) -> Bools:
     """Return `mask` (h, w, n) without parts narrower than three pixels: its opening by 3 × 3."""
-    core = ~_grown(~mask)
-    return _grown(core) & mask
-
-
-def _grown(mask: Bools) -> Bools:
-    """Return whether each pixel or one of its eight neighbours is set."""
-    for axis in (0, 1):
-        lines = np.moveaxis(mask, axis, 0)
-        grown = lines.copy()
-        grown[1:] |= lines[:-1]
-        grown[:-1] |= lines[1:]
-        mask = np.moveaxis(grown, 0, axis)
-    return mask
+    core = ~grown(~mask)
+    return grown(core) & mask

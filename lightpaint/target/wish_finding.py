@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import LUMINANCE, decode_display, encode_display
-from lightpaint.images import block_sums, enlarged
+from lightpaint.images import block_sums, dilated, enlarged, gaussian_mean, number_parts
 from lightpaint.target.painted_target import Target, Wish
 
 #: Stops by which a place must ask for something else than what is around it, to be a wish.
@@ -171,8 +171,6 @@ class _Painting:
         """Return by how many stops of each channel, (3, h, w), a place asks for something else than
         the stroke, (h, w), that it is in.
         """
-        from scipy.ndimage import binary_erosion
-
         dark = DARK * float(np.mean(self.look))
         if dark > 0 and stroke.mean() <= MAX_STROKE_SHARE:
             radius = _wash_radius(stroke.shape[1])
@@ -180,7 +178,7 @@ class _Painting:
                 stroke, *self.channels, dark, radius, DISTINCT_STOPS
             )
             # Within a wash of its rim a stroke may end as sharply as it likes.
-            within = binary_erosion(stroke, iterations=round(radius), border_value=1)
+            within = ~dilated(~stroke, round(radius))
             return np.asarray(departure * within)
         usual = np.median(self.ratio[:, stroke], axis=1)
         return np.asarray(self.ratio - usual[:, None, None].astype(np.float32))
@@ -191,8 +189,6 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floa
 
     For the arguments see `split_wishes`. 0 where the painting is the look, or where both are black.
     """
-    from scipy.ndimage import gaussian_filter
-
     dark = DARK * float(np.mean(current_look))
     if not dark > 0:
         return np.zeros((3, *importance.shape), np.float32)
@@ -204,7 +200,7 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floa
     stops = np.log2(asked / now) * counts
     summed = np.concatenate([stops, counts[None]])
     radius = _wash_radius(importance.shape[1])
-    wash = gaussian_filter(summed, (0, radius, radius))
+    wash = gaussian_mean(summed, radius)
     return np.asarray(counts / np.maximum(wash[3], 1e-6) * wash[:3], np.float32)
 
 
@@ -265,10 +261,7 @@ def _connected(mask: Bools, radius: int, least: float) -> list[Bools]:
     """Return the connected parts of a mask of at least so many pixels, joined over gaps up to about
     twice a radius.
     """
-    from scipy.ndimage import binary_dilation, label
-
-    wide = binary_dilation(mask, iterations=radius) if radius > 0 else mask
-    parts, count = label(wide, np.ones((3, 3)))
+    parts, count = number_parts(dilated(mask, radius))
     parts = np.where(mask, parts, 0)
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     return [parts == k for k in range(1, count + 1) if sizes[k] >= least]
@@ -309,14 +302,11 @@ def departure_from_one_stroke(
 
 def _wash(inside: Bools, radius: float) -> Wash:
     """Return a function that averages (…, h, w) over a radius, within a mask alone."""
-    from scipy.ndimage import gaussian_filter
-
     counts = inside.astype(np.float64)
-    coverage = np.maximum(gaussian_filter(counts, radius), 1e-6)
+    coverage = np.maximum(gaussian_mean(counts, radius), 1e-6)
 
     def washed(values: Floats) -> Doubles:
-        around = (0,) * (values.ndim - 2) + (radius, radius)
-        return np.asarray(gaussian_filter(values * counts, around) / coverage)
+        return np.asarray(gaussian_mean(values * counts, radius) / coverage)
 
     return washed
 

@@ -28,6 +28,7 @@ from lightpaint.arrays import (
     round_to_halves,
 )
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
+from lightpaint.images import grown
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
@@ -264,10 +265,10 @@ def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
 
 def inner_pixels(is_clean: Bools) -> Bools:
     """Return the clean pixels, (h, w), whose neighbours within CLEAN_RADIUS are clean as well."""
-    from scipy.ndimage import binary_erosion
-
-    side = 2 * CLEAN_RADIUS + 1
-    return np.asarray(binary_erosion(is_clean, np.ones((side, side)), border_value=1))
+    near_noise = ~is_clean
+    for _ in range(CLEAN_RADIUS):
+        near_noise = grown(near_noise)
+    return ~near_noise
 
 
 def _encode(plane: Floats, strips: Sequence[_Strip], exact: Bools | None = None) -> EncodedPlane:

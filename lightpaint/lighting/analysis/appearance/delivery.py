@@ -25,6 +25,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import ViewTransform, ciede2000, lab, luminance
 from lightpaint.display_text import visible
+from lightpaint.images import grown
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.wish_parts import (
     AreaWashes,
@@ -79,8 +80,8 @@ class Delivery:
         kind: `group` for all layers of a group; `layer` for a whole layer; `wish` for a part of a
             layer or of a painting without layers.
         is_darker: Whether it asks for less light, and not for more.
-        brightness_error: The standard error of `brightness` by noise of the samples; 0 where all
-            came.
+        brightness_error: The standard error of `brightness` by noise of the samples; 0 where three
+            quarters or more came.
         color_error: The same of `color`.
 
     Examples:
@@ -302,9 +303,14 @@ def _with_errors(
     deliveries: Sequence[Delivery],
     picture: Floats,
 ) -> tuple[Delivery, ...]:
-    """Return deliveries with the standard errors of their shares. For the others see
-    `_measure_parts`.
+    """Return deliveries with the standard errors of the shares of those of which too little came.
+    For the others see `_measure_parts`.
     """
+    places, measured = list(range(len(deliveries))), parts
+    if len(parts) == 1:  # entries of several views are merged
+        unmet = {x.name for x in deliveries if not x.is_met}
+        places = [k for k in places if deliveries[k].name in unmet]
+        measured = [[part for part in parts[0] if part.name in unmet]]
     basis, rng = solution.basis, np.random.default_rng(SEED)
     transform = display_transform(solution.problem)
     look_noise, noise = basis.current_noise, basis.noise.mix(solution.weights)
@@ -315,17 +321,15 @@ def _with_errors(
         look = np.maximum(basis.current_look + signs * look_noise, 0)
         got = np.maximum(picture + signs * noise, 0)
         views = painted_views(solution, look, got)
-        noisy = _measure_parts(views, parts, transform).deliveries
-        if len(noisy) == len(deliveries):
-            pairs = zip(deliveries, noisy, strict=True)
+        noisy = _measure_parts(views, measured, transform).deliveries
+        if len(noisy) == len(places):
+            pairs = zip((deliveries[k] for k in places), noisy, strict=True)
             changes.append([_changes_of_shares(*pair) for pair in pairs])
-    if not changes:
-        return tuple(deliveries)
-    errors = np.sqrt(np.square(changes).mean(axis=0)).tolist()
-    return tuple(
-        replace(x, brightness_error=brightness, color_error=color)
-        for x, (brightness, color) in zip(deliveries, errors, strict=True)
-    )
+    result = list(deliveries)
+    errors = np.sqrt(np.square(changes).mean(axis=0)).tolist() if changes else []
+    for k, (brightness, color) in zip(places, errors, strict=bool(errors)):
+        result[k] = replace(result[k], brightness_error=brightness, color_error=color)
+    return tuple(result)
 
 
 def _changes_of_shares(measured: Delivery, noisy: Delivery) -> tuple[float, float]:
@@ -372,9 +376,7 @@ def _rims(emitters: Bools) -> Bools:
 
     Part of such a pixel may be the emitter, of which a painting has more or less than the samples.
     """
-    from scipy.ndimage import binary_dilation
-
-    return np.asarray(binary_dilation(emitters, np.ones((3, 3))) & ~emitters)
+    return grown(emitters) & ~emitters
 
 
 def _asked_light(target: Target, now: Floats, got: Floats) -> Floats:
