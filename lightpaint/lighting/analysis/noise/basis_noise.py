@@ -180,12 +180,11 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     variance of the residual from pixel to pixel, less the variance of the prediction
     (residuals.py).
     """
-    residuals, is_coupled = Residuals.of(solution), _is_coupled(solution)
-    planes, size, n = solution.basis.planes, solution.basis.size, len(solution.weights)
     weight = solution.problem.squares.weight
     weight = weight.reshape(-1, weight.shape[2])
-    counted, everything = solution.importance > 0, slice(0, len(weight))
+    residuals, everything = Residuals.of(solution), slice(0, len(weight))
     residual, mixed = residuals.residual(everything), residuals.noise(everything)
+    size, counted = solution.basis.size, solution.importance > 0
     roots = np.zeros(residual.shape)
     for c in range(3):
         D = weight[:, c % weight.shape[1]].astype(np.float64)
@@ -196,11 +195,11 @@ def painting_covariance(solution: Solution) -> Doubles | None:
         roots[:, c] = np.sqrt(D * np.maximum(of_both - of_prediction, 0))
     if np.square(roots).sum() <= MIN_PAINTING_NOISE * (weight * np.square(mixed)).sum():
         return None
+    n, is_coupled, planes = len(solution.weights), _is_coupled(solution), solution.basis.planes
     covariance = np.zeros((3, n, 3, n))
-    step, kind = block_of(planes)
-    counted_pixels = np.flatnonzero(counted)
-    for start in with_progress(range(0, counted_pixels.size, step)):
-        part = as_slice(counted_pixels[start : start + step])
+    (step, kind), painted = block_of(planes), np.flatnonzero(counted)
+    for start in with_progress(range(0, painted.size, step)):
+        part = as_slice(painted[start : start + step])
         lit = planes.pixels(part)
         rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
         for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
