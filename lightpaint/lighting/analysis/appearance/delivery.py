@@ -303,7 +303,7 @@ def _with_errors(
     deliveries: Sequence[Delivery],
     picture: Floats,
 ) -> tuple[Delivery, ...]:
-    """Return deliveries with the standard errors of the shares of those of which too little came.
+    """Return deliveries, with the standard errors of their shares where too little came.
     For the others see `_measure_parts`.
     """
     places, measured = list(range(len(deliveries))), parts
