@@ -311,7 +311,7 @@ def like_a_reference(hand: Hand) -> None:
 
 
 def _wait_for_layer(hand: Hand, name: str) -> None:
-    hand.page.locator(".layer-name", has_text=name).first.wait_for(timeout=1000 * PATIENCE_S)
+    hand.page.locator(".layer-name", has_text=name).first.wait_for()
     hand.page.mouse.move(5, 5)
     hand.wait()
 
@@ -416,7 +416,7 @@ def lux_on_desks(hand: Hand) -> None:
     page.get_by_role("button", name="Apply", exact=True).click()
     for title in ("Colour", "Adjust by numbers", "Layers", "Lights"):  # there is room for planes
         page.locator(".fold-head button", has_text=title).first.click()
-    page.locator(".is-planes").wait_for(timeout=1000 * PATIENCE_S)
+    page.locator(".is-planes").wait_for()
     page.get_by_role("checkbox", name="Lux in the picture").check()
     page.get_by_role("button", name="Hide room in the picture").click()
     page.keyboard.press("b")
@@ -487,7 +487,7 @@ def moving_lights(hand: Hand) -> None:
     page.get_by_role("button", name="Begin", disabled=False).wait_for()
     hand.press("Begin")
     working = page.get_by_role("button", name="Stop, move nothing")
-    working.wait_for(timeout=1000 * PATIENCE_S)
+    working.wait_for()
     first = len(hand.frames)
 
     def has_ended() -> bool:
@@ -562,8 +562,9 @@ def using(url: str, theme: Literal["dark", "light"] = "dark") -> Iterator[Hand]:
         page = browser.new_page(
             viewport={"width": WINDOW[0], "height": WINDOW[1]}, color_scheme=theme
         )
+        page.set_default_timeout(1000 * PATIENCE_S)
         page.goto(url)
-        page.locator("[data-light]").first.wait_for(timeout=600_000)
+        page.locator("[data-light]").first.wait_for()
         load(page)
         yield Hand(page)
         browser.close()
@@ -617,7 +618,7 @@ def main() -> None:
             like_a_reference(hand)
             page.screenshot(path=HERE / "painter-reference.jpg", type="jpeg", quality=88)
             page.get_by_role("button", name="Presets", exact=True).click()
-            page.wait_for_function(ARE_PICTURES_DRAWN, timeout=1000 * PATIENCE_S)
+            page.wait_for_function(ARE_PICTURES_DRAWN)
             page.wait_for_timeout(1000)
             page.screenshot(path=HERE / "painter-presets.jpg", type="jpeg", quality=88)
             page.keyboard.press("Escape")
