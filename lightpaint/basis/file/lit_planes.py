@@ -166,7 +166,7 @@ class _LitStrip:
         n, weights = len(self.begins) - 1, weight[self.lit]
         places = self.of_planes(count * np.arange(n)) + groups[self.lit]
         sums = [
-            np.bincount(places, _singles(channel) * weights, minlength=n * count)
+            np.bincount(places, as_singles(channel) * weights, minlength=n * count)
             for channel in self.numbers
         ]
         return np.reshape(sums, (3, n, count))

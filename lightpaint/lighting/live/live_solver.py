@@ -334,7 +334,10 @@ class LiveSolver:
             self._read_paint(views, unpainted)
         self._answers_left -= 1
         paint: dict[str, Any] = {"views": views, "unpainted": unpainted, "is_moving": while_moving}
-        improve = partial(self._improve_mixed, **paint)
+
+        def improve(problem: LiveProblem, start: Doubles) -> _Improved:
+            return self._improve_mixed(problem, start, **paint)
+
         mixed = self._held(start, views, improve) if is_read else improve(self._problem, start)
         self._problem = mixed.problem
         answer = at_slots(

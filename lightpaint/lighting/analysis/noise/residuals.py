@@ -322,10 +322,10 @@ def steadier_light(
         steady[..., c], share[..., c], _ = _steadied(light[..., c], noise[..., c], around)
     if guide is None:
         return steady, share
-    is_guided = counted * (guide > 0).any(axis=-1, keepdims=True)
+    guided = counted * (guide > 0).any(axis=-1, keepdims=True)
     shown = np.maximum(guide, 0)
-    floor = DARK * (shown * is_guided).sum() / max(3 * is_guided.sum(), 1)
-    around, is_guided = _Neighbours.of(is_guided[..., 0]), is_guided[..., 0] > 0
+    floor = DARK * (shown * guided).sum() / max(3 * guided.sum(), 1)
+    around, is_guided = _Neighbours.of(guided[..., 0]), guided[..., 0] > 0
     for c in range(3):
         unit = np.where(is_guided, shown[..., c] + floor, 1)
         ratio, of_ratio, change = _steadied(light[..., c] / unit, noise[..., c] / unit, around)
