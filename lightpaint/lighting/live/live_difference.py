@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour import ViewTransform
-from lightpaint.lighting.analysis.appearance.delivery import PaintedView, have_wishes_come
+from lightpaint.lighting.analysis.appearance.delivery import ViewPictures, have_wishes_come
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.live.live_sums import LayerWishes, SmallFilm
 from lightpaint.target import Target
@@ -66,7 +66,7 @@ class LiveDifference:
         return have_wishes_come(views, self.display)
 
 
-def _painted_view(film: SmallFilm, layers: LayerWishes, picture: Doubles) -> PaintedView:
+def _painted_view(film: SmallFilm, layers: LayerWishes, picture: Doubles) -> ViewPictures:
     """Return a film as a view with a painting. picture: (3, p), of the answer."""
     size = film.size
     painted, weight, marks = film.paint
@@ -84,4 +84,4 @@ def _painted_view(film: SmallFilm, layers: LayerWishes, picture: Doubles) -> Pai
         over_look=True,
         wishes=tuple(layers(film.side)),
     )
-    return PaintedView(target, film.has_emitters_alone, image(film.look), image(picture))
+    return ViewPictures(target, film.has_emitters_alone, image(film.look), image(picture))

@@ -248,8 +248,8 @@ class DeliveryReport:
         return delivery.name if delivery is not None and is_part else ""
 
 
-class PaintedView(NamedTuple):
-    """What deliveries are measured from in a view.
+class ViewPictures(NamedTuple):
+    """The pictures of a view from which deliveries are measured.
 
     target: its painting. emitters_seen: (h, w), where an emitter is in view. now, got: (h, w, 3)
     linear, the scene as it is and the answer.
@@ -261,13 +261,13 @@ class PaintedView(NamedTuple):
     got: Floats
 
 
-def have_wishes_come(views: Sequence[PaintedView], transform: ViewTransform) -> bool:
+def have_wishes_come(views: Sequence[ViewPictures], transform: ViewTransform) -> bool:
     """Return whether the wishes of all views came, as in `has_come`. transform: of the display."""
     parts = [wish_parts(find_wishes(view.target, view.now), None) for view in views]
     return has_come(_measure_parts(views, parts, transform).deliveries)
 
 
-def painted_views(solution: Solution, look: Floats, picture: Floats) -> list[PaintedView]:
+def painted_views(solution: Solution, look: Floats, picture: Floats) -> list[ViewPictures]:
     """Return what deliveries are measured from in each view of a solution.
 
     look, picture: of the scene as it is now and of the answer, in the shape of the joint basis.
@@ -275,7 +275,7 @@ def painted_views(solution: Solution, look: Floats, picture: Floats) -> list[Pai
     views = solution.problem.views
     pairs = enumerate(zip(views.bases, views.targets, strict=True))
     return [
-        PaintedView(target, basis.emitters_seen, views.part(look, k), views.part(picture, k))
+        ViewPictures(target, basis.emitters_seen, views.part(look, k), views.part(picture, k))
         for k, (basis, target) in pairs
     ]
 
@@ -346,7 +346,7 @@ def _changes_of_shares(measured: Delivery, noisy: Delivery) -> tuple[float, floa
 
 
 def _measure_parts(
-    views: Sequence[PaintedView], parts: Sequence[Sequence[WishPart]], transform: ViewTransform
+    views: Sequence[ViewPictures], parts: Sequence[Sequence[WishPart]], transform: ViewTransform
 ) -> DeliveryReport:
     """Measure the delivery of wishes that are known. parts: the wishes of each view."""
     found: list[Delivery] = []
