@@ -58,7 +58,7 @@ export function hatch(x, y, slope) {
 /** Lay ink over a pixel of RGBA: the pixel below loses its colour and half its light.
  * @param {Uint8ClampedArray} rgba @param {number} index @param {number[]} ink
  * @param {number} amount 0 to 1 */
-export function blendInk(rgba, index, ink, amount) {
+function blendInk(rgba, index, ink, amount) {
   const grey =
     (LUMA[0] * rgba[index] + LUMA[1] * rgba[index + 1] + LUMA[2] * rgba[index + 2]) * 0.6;
   for (let c = 0; c < 3; c++) rgba[index + c] = grey + (ink[c] - grey) * amount;

@@ -156,7 +156,7 @@ export function hitTest(visiblePanes, x, y) {
 
 /** Return a place of the canvas in picture pixels of a pane, also outside it.
  * @param {Pane} pane @param {number} x @param {number} y */
-export function toPicture(pane, x, y) {
+function toPicture(pane, x, y) {
   return { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale };
 }
 

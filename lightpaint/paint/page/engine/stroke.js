@@ -56,7 +56,7 @@ const MIN_GRADIENT_LENGTH = 2;
 /** Return the effect that changes brightness and warmth. @param {number} stops
  * @param {number} mired
  * @returns {Effect} */
-export function adjustEffect(stops, mired) {
+function adjustEffect(stops, mired) {
   return { kind: 'adjust', gain: 2 ** stops, tint: warmer(mired) };
 }
 

@@ -34,7 +34,7 @@ export function aroundInset(inset) {
 
 /** Return the corner that is nearest to a place. @param {number} x @param {number} y
  * @param {{width: number, height: number}} area @returns {Display["corner"]} */
-export const nearestCorner = (x, y, { width, height }) =>
+const nearestCorner = (x, y, { width, height }) =>
   `${y < height / 2 ? 'top' : 'bottom'}-${x < width / 2 ? 'left' : 'right'}`;
 
 /** Return the corner that an arrow key leads to. @param {Display["corner"]} corner

@@ -3,7 +3,7 @@
 import { t } from '../language/language.js';
 
 /** Name of the Ctrl key on this system. */
-export const MOD = /mac/i.test(navigator.platform) ? '⌘' : t('Ctrl');
+const MOD = /mac/i.test(navigator.platform) ? '⌘' : t('Ctrl');
 
 /** @type {Record<string, string>} */
 const NAMES = {

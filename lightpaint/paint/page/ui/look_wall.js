@@ -25,7 +25,7 @@ export function showWall({ store }, [a, b, ...more]) {
 }
 
 /** Return the looks that are side by side; none if they are not. @param {Ui} ui @returns {Look[]} */
-export const wallLooks = (ui) => (ui.mix?.more && comparedLooks(ui, ui.mix)) || [];
+const wallLooks = (ui) => (ui.mix?.more && comparedLooks(ui, ui.mix)) || [];
 
 /** Return the columns with which pictures are largest. @param {Size} frame @param {number} count
  * @param {[height: number, width: number]} picture */

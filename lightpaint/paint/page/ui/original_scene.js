@@ -15,7 +15,7 @@ export function showOriginal({ store }) {
 }
 
 /** @param {App} app */
-export function hideOriginal({ store }) {
+function hideOriginal({ store }) {
   if (store.value.isOriginalHeld) store.set({ isOriginalHeld: false });
 }
 

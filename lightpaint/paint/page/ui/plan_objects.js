@@ -12,7 +12,7 @@ const [LETTER, LINE] = [5.2, 9];
 
 /** Return the outline of an object on the plan. @param {[number, number][]} corners in the two axes
  * beside the upward one @param {number} up @param {ToPlan} toPlan @returns {[number, number][]} */
-export function outlineOnPlan(corners, up, toPlan) {
+function outlineOnPlan(corners, up, toPlan) {
   const [a, b] = [0, 1, 2].filter((axis) => axis !== up);
   return corners.map((corner) => {
     const point = [0, 0, 0];

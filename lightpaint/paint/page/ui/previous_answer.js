@@ -23,7 +23,7 @@ export async function showPrevious({ store, session }) {
 }
 
 /** @param {App} app */
-export function hidePrevious({ store }) {
+function hidePrevious({ store }) {
   if (store.value.isPreviousHeld) store.set({ isPreviousHeld: false, previousWeights: null });
 }
 

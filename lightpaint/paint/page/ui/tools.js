@@ -142,7 +142,7 @@ export const MIN_BRUSH_SIZE = 2;
 export const MAX_BRUSH_SIZE = 1000;
 
 /** Range of the paint's slider, in stops from white. */
-export const PAINT_MAX_STOPS = 8;
+const PAINT_MAX_STOPS = 8;
 
 /** Largest number of recent colours. */
 const MAX_RECENT = 7;

@@ -81,7 +81,7 @@ export function gradientTile(gradient, { coverage: mask }, region, albedo, width
 
 /** Return what gives 0 at the start of a gradient to 1 at its end, smoothly.
  * @param {Gradient} gradient @returns {(x: number, y: number) => number} at a pixel */
-export function rampOf({ shape, start, end }) {
+function rampOf({ shape, start, end }) {
   const [dx, dy] = [end[0] - start[0], end[1] - start[1]];
   const square = dx * dx + dy * dy;
   if (square < MIN_GRADIENT) return () => 0;

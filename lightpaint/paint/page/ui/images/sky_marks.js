@@ -77,14 +77,14 @@ export function directionText(sky, { places }, place) {
 
 /** Return a place of the map as percentages from its left and its top. @param {Vector} direction
  * @param {number} rows @param {number} columns @returns {[x: number, y: number]} */
-export function percentAt(direction, rows, columns) {
+function percentAt(direction, rows, columns) {
   const [row, column] = skyPlace(direction, rows, columns);
   return [(100 * (column + 0.5)) / columns, (100 * (row + 0.5)) / rows];
 }
 
 /** Return lines that do not cross the map where they leave it at one side and go on at the other.
  * @param {[number, number][]} points in percent @returns {[number, number][][]} */
-export function unwrappedLines(points) {
+function unwrappedLines(points) {
   /** @type {[number, number][][]} */
   const lines = [[]];
   points.forEach((point, k) => {

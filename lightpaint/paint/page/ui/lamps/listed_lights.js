@@ -15,7 +15,7 @@ import { t } from '../../language/language.js';
 export const MAX_ROWS_WITH_SLIDERS = 16;
 
 /** Number of rows above which groups are folded at first, and only rows in view exist. */
-export const MAX_EXISTING_ROWS = 96;
+const MAX_EXISTING_ROWS = 96;
 
 /** Return the lights that the search finds: by words in their names, or by patterns as in a lights
  * file (`spot_*`). A comma separates alternatives. @param {Ui} ui @returns {number[]} */

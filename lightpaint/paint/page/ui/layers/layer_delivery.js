@@ -12,7 +12,7 @@ const MIN_DELIVERED = 0.75;
 
 /** Return the entry of a layer or a group; undefined if there is none.
  * @param {Ui} ui @param {Layer} layer */
-export function deliveryOf({ deliveries, layers }, layer) {
+function deliveryOf({ deliveries, layers }, layer) {
   if (layer.kind !== 'group')
     return deliveries.find(({ kind, layers: ids }) => kind === 'layer' && ids[0] === layer.id);
   const members = layers.filter(({ group }) => group === layer.id).map(({ id }) => id);

@@ -27,7 +27,7 @@ function takeDroppedFile(app, file) {
 
 /** Take a file: import it, or ask what becomes of the layers that are there.
  * @param {App} app @param {File | undefined} file */
-export function takeLayerFile({ store, session, engine }, file) {
+function takeLayerFile({ store, session, engine }, file) {
   if (!file) return;
   if (!ENDINGS.some((ending) => file.name.toLowerCase().endsWith(ending))) {
     session.toast(

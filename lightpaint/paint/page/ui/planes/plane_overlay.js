@@ -30,7 +30,7 @@ export const casesOf = (planes) => [...new Set(planes?.planes.map((plane) => pla
 
 /** Return the cells that are drawn; none where the answer's light is not shown, or not asked for.
  * @param {Ui} ui @returns {PlaneCell[]} */
-export function shownCells(ui) {
+function shownCells(ui) {
   const { planes, planesReading } = ui;
   const isOther = ui.previousWeights || ui.isOriginalHeld || ui.mix || ui.hoveredLight !== null;
   if (overlayOf(ui) !== 'lux' || !planes || !planesReading || isOther) return [];

@@ -11,10 +11,10 @@ import { shortcutsOf } from '../key_bindings.js';
 
 /** Widest soft edge, in pixels, and largest tolerance, in ΔE. */
 export const MAX_FEATHER = 200;
-export const MAX_TOLERANCE = 60;
+const MAX_TOLERANCE = 60;
 
 /** Small widths matter more. */
-export const FEATHER_CURVE = {
+const FEATHER_CURVE = {
   toPosition: (/** @type {number} */ x) => Math.sqrt(x),
   toValue: (/** @type {number} */ x) => Math.round(x * x),
 };
