@@ -8,22 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis import Basis, texel_lights
 from lightpaint.basis.cache import Render, basis_cache, folder, obtain_basis, top_up_basis
 from lightpaint.basis.render import ONE_PASS, KeptTracer, kept_loaded, render_basis, samples_for
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import BasisError
-from lightpaint.lighting import (
-    Problem,
-    Solution,
-    correct_noise,
-    error_bars,
-    pixel_variances,
-    sample_demand,
-    solution_of,
-    top_up_counts,
-)
 from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
 from lightpaint.pipeline.job.solve_job import Job, PaintedView
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
@@ -193,30 +184,34 @@ def view_listener(job: Job, view: PaintedView, listen: Listener) -> Listener:
     return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
 
 
-def problem_of(job: Job, bases: Sequence[Basis]) -> Problem:
+def problem_of(job: Job, bases: Sequence[Basis]) -> lighting.Problem:
     """Return the problem of a job and the bases of its views."""
     targets = [view.target for view in job.views]
-    return Problem.of(list(bases), targets, constraints=job.all_constraints, fit=job.fit)
+    return lighting.Problem.of(list(bases), targets, constraints=job.all_constraints, fit=job.fit)
 
 
-def without_noise(job: Job, solution: Solution) -> Solution:
+def without_noise(job: Job, solution: lighting.Solution) -> lighting.Solution:
     """Return a solution whose noise is corrected, if the settings ask for it."""
     is_known = solution.basis.knows_noise
-    return correct_noise(solution) if job.settings.corrects_noise(is_known=is_known) else solution
+    return (
+        lighting.correct_noise(solution)
+        if job.settings.corrects_noise(is_known=is_known)
+        else solution
+    )
 
 
 @dataclass(frozen=True)
 class Certainty:
     """An answer and its errors. light: the least certain one. errors: (n,), of `picture_errors`."""
 
-    solution: Solution
+    solution: lighting.Solution
     light: str
     errors: Doubles
 
     @classmethod
-    def of(cls, solution: Solution) -> "Certainty":
+    def of(cls, solution: lighting.Solution) -> "Certainty":
         """Return the certainty of a solution whose basis knows its noise, which samples lower."""
-        uncertainty = error_bars(solution, with_painting=False)
+        uncertainty = lighting.error_bars(solution, with_painting=False)
         assert uncertainty is not None
         errors = picture_errors(solution.basis, uncertainty)
         return cls(solution, solution.basis.names[int(np.argmax(errors))], errors)
@@ -243,7 +238,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
     earlier_spp = [basis.origin.mean_spp for basis in bases]
     with kept_loaded([view.scene for view in job.views if view.scene is not None]) as tracers:
         for _ in range(MAX_ROUNDS):
-            state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
+            state = Certainty.of(without_noise(job, lighting.solution_of(problem_of(job, bases))))
             most_spp = max(basis.origin.mean_spp for basis in bases)
             if state.error <= settings.error or is_over() or most_spp >= MAX_SPP:
                 break
@@ -298,10 +293,10 @@ def aims_of(state: Certainty) -> Doubles:
 def needed_counts(state: Certainty, bases: Sequence[Basis], error: float) -> list[Indices]:
     """Return the samples to add to each half of each pixel of each view, (h, w) each."""
     views, solution = state.solution.problem.views, state.solution
-    variances = pixel_variances(solution, aims_of(state))
+    variances = lighting.pixel_variances(solution, aims_of(state))
     existing_halves = [_half_samples(basis) for basis in bases]
     new_halves = [
-        sample_demand(
+        lighting.sample_demand(
             views.part(variances, k), views.part(solution.importance, k) > 0, existing_halves[k]
         )
         for k in range(len(bases))
@@ -311,7 +306,7 @@ def needed_counts(state: Certainty, bases: Sequence[Basis], error: float) -> lis
     existing = np.concatenate([x.ravel() for x in existing_halves])
     goal = AIM * (error / state.error) ** 2 * variance.sum()
     for size in ROUND_SIZES:
-        counts = top_up_counts(density, existing, size * existing.sum())
+        counts = lighting.top_up_counts(density, existing, size * existing.sum())
         if (variance * existing / (existing + counts)).sum() <= goal:
             break
     ends = np.cumsum([x.size for x in existing_halves])[:-1]

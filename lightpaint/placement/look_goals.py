@@ -7,19 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.arrays import Floats
 from lightpaint.basis import Basis, BasisLight
 from lightpaint.errors import SceneError
 from lightpaint.images import block_mean, whole_factor
-from lightpaint.lighting import (
-    Constraints,
-    LightConstraint,
-    NormalEquations,
-    Problem,
-    Reduction,
-    Solution,
-    reduce_to,
-)
 from lightpaint.scene import Scene, reduction_to
 
 #: Number of pixels of the small films, on which all places are compared, and of the larger films
@@ -47,13 +39,13 @@ def check_views(
 
 
 def check_looks(
-    solution: Solution | Sequence[Solution], bases: Sequence[Basis]
-) -> list[tuple[Solution, list[int]]]:
+    solution: lighting.Solution | Sequence[lighting.Solution], bases: Sequence[Basis]
+) -> list[tuple[lighting.Solution, list[int]]]:
     """Return each solution, and the places of its views among `bases`.
 
     Raises SceneError for a look of another view, and without any look.
     """
-    if isinstance(solution, Solution):
+    if isinstance(solution, lighting.Solution):
         return [(solution, list(range(len(bases))))]
     known = [(basis.origin.sensor, basis.size) for basis in bases]
     looks = []
@@ -109,8 +101,8 @@ class LookGoal:
 
     goal: Floats
     importance: Floats
-    reduction: Reduction
-    pull: NormalEquations | None
+    reduction: lighting.Reduction
+    pull: lighting.NormalEquations | None
     noise: Floats
 
     @property
@@ -125,11 +117,11 @@ class LookGoal:
 
 
 def goal_of(
-    solution: Solution,
+    solution: lighting.Solution,
     views: Sequence[int],
     sizes: Sequence[tuple[int, int]],
     new: Sequence[BasisLight],
-    constraints: Constraints | None,
+    constraints: lighting.Constraints | None,
 ) -> LookGoal:
     """Return the goal of a look on the pixels of all views, with importance only in its own views.
 
@@ -146,7 +138,7 @@ def goal_of(
             whole = np.broadcast_to(image, (*image.shape[:-1], 3))
             listed[view] = whole.reshape(-1, 3)
     all_constraints = solution.problem.constraints.and_then(
-        Constraints() if constraints is None else constraints
+        lighting.Constraints() if constraints is None else constraints
     )
     return LookGoal(
         np.concatenate(images),
@@ -168,8 +160,8 @@ def balanced(goals: Sequence[LookGoal]) -> list[LookGoal]:
 
 
 def _with_new_lights(
-    reduction: Reduction, new: Sequence[BasisLight], constraints: Constraints
-) -> Reduction:
+    reduction: lighting.Reduction, new: Sequence[BasisLight], constraints: lighting.Constraints
+) -> lighting.Reduction:
     """Return `reduction` with the unknowns of new lights after its own."""
     if not new:
         return reduction
@@ -178,7 +170,7 @@ def _with_new_lights(
         for pattern, table, where in constraints.lights
         if any(fnmatchcase(light.name, pattern) or light.name == pattern for light in new)
     ]
-    more = reduce_to(Constraints(tuple(entries)), new)
+    more = lighting.reduce_to(lighting.Constraints(tuple(entries)), new)
     first = len(reduction.fixed_weights)
     knobs = [
         replace(
@@ -204,19 +196,19 @@ def _absolute(table: Mapping[str, Any]) -> dict[str, Any]:
 
     A lock, or a limit that is a share, refers to its present emission, which is black.
     """
-    constraint = LightConstraint.of(table)
+    constraint = lighting.LightConstraint.of(table)
     relative = {"lock"}
     if any(level is not None and level.is_share for level in (constraint.least, constraint.most)):
         relative.add("limits")
     return {key: value for key, value in table.items() if key not in relative}
 
 
-def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
+def pull_with_more(solution: lighting.Solution, count: int) -> lighting.NormalEquations | None:
     """Return the pull of the lights to their current emission, and none of `count` more."""
     if (pull := solution.problem.pull) is None:
         return None
     coupling = pull.coupling
-    return NormalEquations(
+    return lighting.NormalEquations(
         np.pad(pull.M, ((0, 0), (0, count), (0, count))),
         np.pad(pull.b, ((0, 0), (0, count))),
         pull.target_norm2,
@@ -224,7 +216,7 @@ def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
     )
 
 
-def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats, Floats]:
+def reduced_goal(problem: lighting.Problem, factor: int) -> tuple[Floats, Floats, Floats]:
     """Return the goal of a view, its importance and its noise on a film of blocks of pixels.
 
     Goals and noise are means weighted with importance; importance is the importance of whole

@@ -11,19 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint import luminaires
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.colour import WAVELENGTHS
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.luminaires import (
-    AREA_PLUGIN,
-    EMITTER_FROM_WEB,
-    NUMBER_KEYS,
-    POINT_PLUGIN,
-    SpotPart,
-    spots_of,
-    world_from_web,
-)
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene import (
     AS_AUTHORED,
@@ -272,13 +264,13 @@ def luminaire_xml(
     assert hung is not None
     weight = emitter.sampling_weight if sampling_weight is None else sampling_weight
     props = scene.parsed.state.nodes[emitter.node].props
-    numbers = {key: float(props[key]) for key in NUMBER_KEYS if key in props}
+    numbers = {key: float(props[key]) for key in luminaires.NUMBER_KEYS if key in props}
     file, shown = str(props["filename"]), np.array(level) if powers is None else powers
     intensity = _intensity(shown)
-    if emitter.plugin == AREA_PLUGIN:
+    if emitter.plugin == luminaires.AREA_PLUGIN:
         name = "" if hung.is_panel else str(props.id())
         lines = luminaire_lines(
-            AREA_PLUGIN, name, file, numbers, intensity, None, sampling_weight=weight
+            luminaires.AREA_PLUGIN, name, file, numbers, intensity, None, sampling_weight=weight
         )
         if not hung.is_panel:
             return lines
@@ -289,7 +281,7 @@ def luminaire_xml(
     if spots := _spots(hung, is_spectral=powers is not None):
         return _spot_lines(hung.name, spots, matrix, numbers, hung.scale * shown, weight)
     return luminaire_lines(
-        POINT_PLUGIN, hung.name, file, numbers, intensity, matrix, sampling_weight=weight
+        luminaires.POINT_PLUGIN, hung.name, file, numbers, intensity, matrix, sampling_weight=weight
     )
 
 
@@ -306,7 +298,7 @@ def written_emission(scene: Scene, emitter: Emitter, level: RGB) -> RGB:
     That is the level, but for a luminaire whose first spot has the name.
     """
     hung = luminaire_of(scene, emitter)
-    spots = _spots(hung) if hung is not None and emitter.plugin == POINT_PLUGIN else ()
+    spots = _spots(hung) if hung is not None and emitter.plugin == luminaires.POINT_PLUGIN else ()
     if not spots:
         return level
     assert hung is not None
@@ -320,7 +312,7 @@ def plugin_remark(scene: Scene) -> str | None:
         x.name
         for x in scene.emitters
         if (hung := luminaire_of(scene, x)) is not None
-        and (x.plugin == AREA_PLUGIN or not _spots(hung, is_spectral=scene.is_spectral))
+        and (x.plugin == luminaires.AREA_PLUGIN or not _spots(hung, is_spectral=scene.is_spectral))
     ]
     if not names:
         return None
@@ -330,17 +322,17 @@ def plugin_remark(scene: Scene) -> str | None:
     )
 
 
-def _spots(hung: HungLuminaire, *, is_spectral: bool = False) -> tuple[SpotPart, ...]:
+def _spots(hung: HungLuminaire, *, is_spectral: bool = False) -> tuple[luminaires.SpotPart, ...]:
     """Return the spots that add up to a luminaire; none with spectra if some are negative, which
     spectra of Mitsuba are not.
     """
-    spots = spots_of(hung.request.web)
+    spots = luminaires.spots_of(hung.request.web)
     return () if is_spectral and any(x.candela < 0 for x in spots) else spots
 
 
 def _spot_lines(
     name: str,
-    spots: Sequence[SpotPart],
+    spots: Sequence[luminaires.SpotPart],
     matrix: Doubles,
     numbers: dict[str, float],
     level: Doubles,
@@ -353,7 +345,10 @@ def _spot_lines(
     turn, tilt = numbers.get("turn", 0.0), numbers.get("tilt", 0.0)
     hung = np.eye(4)
     hung[:3, 3] = matrix[:3, 3]
-    hung[:3, :3] = world_from_web(matrix[:3, :3], turn=turn, tilt=tilt) @ EMITTER_FROM_WEB.T
+    hung[:3, :3] = (
+        luminaires.world_from_web(matrix[:3, :3], turn=turn, tilt=tilt)
+        @ luminaires.EMITTER_FROM_WEB.T
+    )
     lines: list[str] = []
     for k, spot in enumerate(spots if level.any() else spots[:1]):
         inner = [

@@ -6,16 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint import colour
 from lightpaint.arrays import Floats
-from lightpaint.colour import (
-    REC709,
-    SPACES,
-    converted,
-    is_rec709,
-    primaries_in,
-    rgb_to_xyz,
-    to_rec709,
-)
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.exr import ExrPart
@@ -113,7 +105,7 @@ def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
     if chroma[0] is None or chroma[1] is None:
         # Grey needs no conversion, since white is adapted to white.
         return np.repeat(luminance[..., None], 3, axis=-1)
-    image = _from_chroma(luminance, chroma[0], chroma[1], primaries or REC709)
+    image = _from_chroma(luminance, chroma[0], chroma[1], primaries or colour.REC709)
     return _in_rec709(image, primaries)
 
 
@@ -194,7 +186,7 @@ def _is_colour(part: ExrPart, prefix: str) -> bool:
 
 def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]) -> Floats:
     """Return RGB from luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
-    red, green, blue = rgb_to_xyz(primaries)[1]
+    red, green, blue = colour.rgb_to_xyz(primaries)[1]
     image = np.empty((*y.shape, 3), np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
         image[..., 0] = (ry + 1) * y
@@ -204,7 +196,7 @@ def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]
 
 
 def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
-    return image if primaries is None else converted(image, to_rec709(primaries))
+    return image if primaries is None else colour.converted(image, colour.to_rec709(primaries))
 
 
 def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
@@ -213,16 +205,16 @@ def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
     Raises ImageError, without naming the file, if the name is not the name of a known linear space.
     """
     if part.primaries is not None:
-        return None if is_rec709(part.primaries) else part.primaries
+        return None if colour.is_rec709(part.primaries) else part.primaries
     space = part.attributes.get(COLOR_SPACE, "")
     if space in UNSPECIFIED or space.startswith(("lin_rec709", "lin_srgb")):
         return None
-    if space not in SPACES:
+    if space not in colour.SPACES:
         raise ImageError(
             f"is in the colour space {space!r}, but linear Rec.709 is expected: convert it and "
             "export it again"
         )
-    return primaries_in(SPACES[space])
+    return colour.primaries_in(colour.SPACES[space])
 
 
 def _joined(layer: str, name: str) -> str:

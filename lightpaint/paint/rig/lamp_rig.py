@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import placement
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis import (
     Basis,
@@ -39,16 +40,6 @@ from lightpaint.paint.rig.page_geometry import (
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
-from lightpaint.placement import (
-    Freedom,
-    Rigging,
-    freedoms_of,
-    is_panel,
-    panel_site,
-    rigging_of,
-    surfaces_of,
-    why_not_searched,
-)
 from lightpaint.scene import Pose, Scene, motion_of, render_features
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
@@ -114,7 +105,7 @@ class LampRig:
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
         self._known_places: dict[PoseKey, LightPlace] = {}
         self.step, self._drafts = 1, set[str]()
-        self._freedoms: Mapping[str, Freedom] | None = None
+        self._freedoms: Mapping[str, placement.Freedom] | None = None
 
     @property
     def scene(self) -> Scene:
@@ -124,21 +115,21 @@ class LampRig:
         return self.subjects[0].loaded_scene
 
     @property
-    def freedoms(self) -> Mapping[str, Freedom]:
+    def freedoms(self) -> Mapping[str, placement.Freedom]:
         """Freedom of the lights that the lights file lets move, by name."""
         if self._freedoms is None:
-            self._freedoms = freedoms_of(self.rigging, self.scene)
+            self._freedoms = placement.freedoms_of(self.rigging, self.scene)
         return self._freedoms
 
     @cached_property
-    def rigging(self) -> Rigging:
+    def rigging(self) -> placement.Rigging:
         """The rigging of the lights file."""
-        return rigging_of(self.scene.requests)
+        return placement.rigging_of(self.scene.requests)
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
         """Names of rails, surfaces and shapes that new lights may hang on."""
-        return surfaces_of(self.rigging, self.scene)
+        return placement.surfaces_of(self.rigging, self.scene)
 
     @cached_property
     def cameras(self) -> tuple[Camera | None, ...]:
@@ -229,7 +220,7 @@ class LampRig:
         if values and "kind" in values:
             return ""
         light = scene.light(name)
-        return why_not_searched(light)
+        return placement.why_not_searched(light)
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
         """Return the place of a light in a pose. Raises LightpaintError for an impossible one."""
@@ -249,7 +240,7 @@ class LampRig:
         site = light.members[0].site
         if values:
             site = motion_of(name, light.plugin, site, _pose(name, values)).site
-        return panel_site(self.scene, light, site) if is_panel(light) else site
+        return placement.panel_site(self.scene, light, site) if placement.is_panel(light) else site
 
     def directions(self, placed: Placed) -> dict[str, Position]:
         """Return where the lights of the scene point, by name; only of those that point somewhere.

@@ -6,18 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis import Lights
-from lightpaint.lighting import (
-    Reduction,
-    Requirements,
-    WishedLight,
-    WishOutcome,
-    planes_answer,
-    requirements_within_reach,
-    watts_allowed,
-    wished_light,
-)
 from lightpaint.paint.protocol import (
     Camera,
     MeasuredPlane,
@@ -77,11 +68,11 @@ class SessionPlanes:
         )
         return replace(self, illuminance=illuminance)
 
-    def wished_of(self, reduction: Reduction) -> WishedLight:
+    def wished_of(self, reduction: lighting.Reduction) -> lighting.WishedLight:
         """Return the wishes as requirements of the lights of a reduction. Raises ConstraintError
         for a limit of power and a lamp of unknown power.
         """
-        return wished_light(
+        return lighting.wished_light(
             self.illuminance,
             self.budget,
             reduction,
@@ -99,7 +90,7 @@ class SessionPlanes:
                 for plane in self.illuminance.planes
             ),
             floor_m2=self.floor_m2 or None,
-            budget_watts=watts_allowed(self.budget, self.floor_m2),
+            budget_watts=lighting.watts_allowed(self.budget, self.floor_m2),
             cameras=tuple(sight.camera for sight in self.sights),
         )
 
@@ -136,13 +127,13 @@ class WishesInEffect:
     """
 
     planes: SessionPlanes
-    reduction: Reduction
-    wished: WishedLight
-    requirements: Requirements | None
+    reduction: lighting.Reduction
+    wished: lighting.WishedLight
+    requirements: lighting.Requirements | None
 
     @classmethod
     def of(
-        cls, planes: SessionPlanes, reduction: Reduction, *, are_ignored: bool
+        cls, planes: SessionPlanes, reduction: lighting.Reduction, *, are_ignored: bool
     ) -> "WishesInEffect":
         """Return the wishes in effect. Raises LightpaintError if limits of lamps contradict the
         limit of power.
@@ -150,7 +141,7 @@ class WishesInEffect:
         wished = planes.wished_of(reduction)
         requirements = None
         if not (are_ignored or wished.is_empty):
-            requirements, _ = requirements_within_reach(wished, reduction)
+            requirements, _ = lighting.requirements_within_reach(wished, reduction)
         return cls(planes, reduction, wished, requirements)
 
     def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
@@ -158,7 +149,9 @@ class WishesInEffect:
 
         place_key: identifies the present places of the lights.
         """
-        answer = planes_answer(self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2)
+        answer = lighting.planes_answer(
+            self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2
+        )
         measured = self.planes.illuminance
         lux = {case: measured.of(lit) for case, lit in answer.weights_by_case.items()}
         return PlanesReading(
@@ -181,7 +174,9 @@ class WishesInEffect:
         )
 
 
-def _wishes_of(plane: str, case: str, outcomes: Sequence[WishOutcome]) -> tuple[PlaneWish, ...]:
+def _wishes_of(
+    plane: str, case: str, outcomes: Sequence[lighting.WishOutcome]
+) -> tuple[PlaneWish, ...]:
     """Return the wishes for a plane in a case, and whether they are met; "" for the power."""
     return tuple(
         PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint import lighting
 from lightpaint.arrays import Bools
 from lightpaint.basis import Basis, FrameSequence, LightGroups, Lights, spoken_frames
 from lightpaint.basis.cache import check_same_view
@@ -20,17 +21,6 @@ from lightpaint.errors import ConstraintError, LightpaintError, SceneError, Targ
 from lightpaint.files import check_writable
 from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.lighting import (
-    Constraints,
-    Scale,
-    agreed_scale,
-    check_powers,
-    constraints_of,
-    reduce_to,
-    resolve_for_targets,
-    with_scale,
-    with_sure_scale,
-)
 from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,
@@ -140,15 +130,15 @@ class Job:
     targets: tuple[Target | Painting, ...]
     folder: Path
     basis: AnyBasis | tuple[AnyBasis, ...] | None = None
-    constraints: Constraints = field(default_factory=Constraints)
+    constraints: lighting.Constraints = field(default_factory=lighting.Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
     rigging: Rigging = field(default_factory=Rigging)
     placement: PlacementRecord | PlacementFile | None = None
     sequence: FrameSequence | None = None
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
-    all_constraints: Constraints = field(init=False, repr=False)
-    scale: Scale = field(init=False, repr=False)
+    all_constraints: lighting.Constraints = field(init=False, repr=False)
+    scale: lighting.Scale = field(init=False, repr=False)
     all_rigging: Rigging = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
@@ -184,11 +174,11 @@ class Job:
         source = scenes[0] if scenes else bases[0]
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
-            all_constraints = constraints_of(source.requests).and_then(all_constraints)
+            all_constraints = lighting.constraints_of(source.requests).and_then(all_constraints)
         _check_one_scale(all_constraints, self.settings)
         for scene in scenes:
-            agreed_scale(scene.cd_per_unit, self.settings.cd_per_unit)
-        scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
+            lighting.agreed_scale(scene.cd_per_unit, self.settings.cd_per_unit)
+        scale = lighting.Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
         if self.settings.spectral:
             observer = observer_of(self.settings.observer)
@@ -200,12 +190,12 @@ class Job:
         # Reports impossible constraints before rendering.
         lights = self._lights(scenes, bases)
         # Which lights reach planes is known after these are measured.
-        self._set(scale=Scale.of(all_constraints, lights))
-        scaled = with_sure_scale if self.settings.planes is None else with_scale
+        self._set(scale=lighting.Scale.of(all_constraints, lights))
+        scaled = lighting.with_sure_scale if self.settings.planes is None else lighting.with_scale
         all_constraints = scaled(all_constraints, lights)
-        reduction = reduce_to(all_constraints, lights)
+        reduction = lighting.reduce_to(all_constraints, lights)
         if self.settings.watts is not None:
-            check_powers(reduction, [light.name for light in lights], "a limit of power")
+            lighting.check_powers(reduction, [light.name for light in lights], "a limit of power")
         if self.settings.planes is not None:
             checked_scale(self.settings.planes, all_constraints.cd_per_unit)
         if scenes and (count := wanted_sun(self.settings, scenes)):
@@ -219,7 +209,7 @@ class Job:
             views = tuple(x.without(y.holes) for x, y in zip(views, self.all_groups, strict=True))
         results = self._result_folder(views, scenes, targets)
         results.check()
-        fit = resolve_for_targets(self.settings, [view.target for view in views])
+        fit = lighting.resolve_for_targets(self.settings, [view.target for view in views])
         self._set(views=views, all_constraints=all_constraints, fit=fit, results=results)
         self._set(all_rigging=all_rigging)
         self._set(remarks=tuple(self._remarks(targets, scenes)))
@@ -250,7 +240,9 @@ class Job:
             return ()
         return tuple(self.sequence.frame_of(groups.path) for groups in self.all_groups)
 
-    def with_moved_lights(self, scenes: Sequence[Scene], constraints: Constraints) -> "Job":
+    def with_moved_lights(
+        self, scenes: Sequence[Scene], constraints: lighting.Constraints
+    ) -> "Job":
         """Return this job with moved lights.
 
         scenes: the scene of each view, on the same film. constraints: on added lights. Raises
@@ -266,7 +258,7 @@ class Job:
 
     def with_scenes(self, scenes: Sequence[Scene]) -> "Job":
         """Return this job with another scene for each view, on the same film."""
-        return self.with_moved_lights(scenes, Constraints())
+        return self.with_moved_lights(scenes, lighting.Constraints())
 
     def with_placement(self, placement: PlacementRecord) -> "Job":
         """Return this job with the places of lights found for another look."""
@@ -465,7 +457,7 @@ def check_same_picture(target: Target, scene: Scene) -> None:
         )
 
 
-def _check_one_scale(constraints: Constraints, settings: Settings) -> None:
+def _check_one_scale(constraints: lighting.Constraints, settings: Settings) -> None:
     """Raise ConstraintError if a lights file and the settings say different scales."""
     own, given = constraints.cd_per_unit, settings.cd_per_unit
     if own is not None and given is not None and own != given:
