@@ -80,6 +80,22 @@ def _mentions_and_code(source: str) -> tuple[list[str], str]:
     return mentions, code
 
 
+def test_doors_list_each_name_once_and_modules_in_order() -> None:
+    doors = 0
+    for path in HERE.rglob("*/__init__.py"):
+        if "lazy_names(__name__)" not in path.read_text("utf-8"):
+            continue
+        imports = [x for x in statements(tree_of(path)) if isinstance(x, ast.ImportFrom)]
+        own = f"lightpaint.{'.'.join(path.parent.relative_to(HERE).parts)}."
+        inner = sorted((x.lineno, x) for x in imports if str(x.module).startswith(own))
+        homes = [str(node.module) for _, node in inner]
+        names = [alias.name for _, node in inner for alias in node.names]
+        assert homes == sorted(set(homes)), path
+        assert len(names) == len(set(names)), path
+        doors += 1
+    assert doors >= 18
+
+
 def test_prose_is_told_from_code() -> None:
     source = """f("#`no_a`", '`no_b`')  # `see_a` "`see_b`\nr'\\'#`no_c`'\n\"""of `see_c`\"""x_y"""
     mentions, code = _mentions_and_code(source)
