@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.appearance import held_answer
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live_solver import ANSWERS_PER_READING, LiveSolver
@@ -141,8 +142,14 @@ def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
     "words", [{}, {"light 1": {"lock": True}}, {"light 0": {"limits": {"max": "40%"}}}]
 )
 def test_the_answer_under_a_brush_is_that_of_a_solve(
-    make_basis: Any, words: dict[str, Any], fit: dict[str, Any], count: int
+    make_basis: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    words: dict[str, Any],
+    fit: dict[str, Any],
+    count: int,
 ) -> None:
+    """Before it is held to the current lights, of which test_contrast.py has a test."""
+    monkeypatch.setattr(held_answer, "PULLS", ())
     constraints = Constraints.of(light=words)
     brushes = _paint_views(make_basis, 5, count, 0)
     resolved_fit = _resolve_fit([brush.target for brush in brushes], space="linear", **fit)
