@@ -14,7 +14,7 @@ from lightpaint.lighting.live.live_sums import LayerWishes, SmallFilm
 from lightpaint.target import Target
 
 #: Approximate number of blocks that are compared.
-COMPARED_BLOCKS = 2**11
+COMPARED_BLOCKS = 2**10
 
 
 @dataclass(frozen=True)
