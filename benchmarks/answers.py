@@ -179,8 +179,14 @@ def live_ms(basis: Any, image: np.ndarray, importance: np.ndarray) -> float:
     """Return the mean ms of the answers to a stroke that brings out the painting."""
     import lightpaint as lp
     from lightpaint.lighting.fit import resolve_fit
-    from lightpaint.lighting.live.live_solver import LiveSolver
     from lightpaint.lighting.live.live_view import LiveView
+
+    try:
+        from lightpaint.lighting.live.live_solver import LiveSolver
+    except ImportError:  # an earlier version
+        from lightpaint.lighting.live.live import (  # type: ignore[import-not-found,no-redef]
+            LiveSolver,
+        )
 
     transform, (height, width) = view_of(basis), basis.size
     canvas = np.asarray(basis.mix(basis.current_weights), np.float32).copy()
