@@ -376,10 +376,12 @@ def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertai
     light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
     if is_by_painting(uncertainty, k):
-        return (
-            f"{is_undetermined} Noise of the painting leaves {light}, open by {change} (95 %): "
-            "more samples would not change that."
-        ).lstrip()
+        cause, advice = "Noise of the painting", "more samples would not change that"
+        if uncertainty.is_filtered:
+            cause = "The reconstruction filter of the painting, which is a render,"
+            advice = "render it with a box filter"
+        sentence = f"{cause} leaves {light}, open by {change} (95 %): {advice}."
+        return f"{is_undetermined} {sentence}".lstrip()
     sentence = (
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."

@@ -117,6 +117,8 @@ def test_the_light_that_matters_is_named(make_basis: Any):
     text = uncertainty_sentence(basis, solution, bars)
     assert text.startswith("Noise of the painting leaves light")
     assert "would halve that" not in text
+    text = uncertainty_sentence(basis, solution, replace(bars, is_filtered=True))
+    assert text.startswith("The reconstruction filter of the painting, which is a render, leaves")
     bars = replace(bars, painting_scatter=0 * bars.scatter)
     text = uncertainty_sentence(basis, solution, bars)
     assert "More samples would change light" in text

@@ -37,7 +37,7 @@ from lightpaint.lighting.analysis.noise.noise_rows import (
     factor,
     folded,
 )
-from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residuals, channel_grain
+from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -47,9 +47,6 @@ from lightpaint.threads import one_thread, parallel_map
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
 MAX_NOISE_SHARE = 0.5
-
-#: Least noise of a painting that counts, relative to the noise of the prediction.
-MIN_PAINTING_NOISE = 0.02
 
 #: Fewest lights whose noise is summed in float32.
 MIN_SINGLE_LIGHTS = 32
@@ -134,7 +131,7 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     """
     weights, pixels = solution.weights, NoisyPixels.of(solution, removed=removed)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
-    is_coupled = _is_coupled(solution)
+    is_coupled = couples_channels(solution)
     sums = NoiseSums.zeros(len(weights))
     if len(weights) > FEW_LIGHTS:  # channels are summed in parallel, and sums need much room
         pixels.add(counted, sums, is_coupled=is_coupled)
@@ -165,50 +162,11 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     )
 
 
-def _is_coupled(solution: Solution) -> bool:
+def couples_channels(solution: Solution) -> bool:
     """Return whether a dimmer, a tie, a limit on luminance, or the one weight of a scalar light
     couples channels.
     """
     return len(solution.problem.full.channel_groups) < 3
-
-
-def painting_covariance(solution: Solution) -> Doubles | None:
-    """Return the covariance of the gradient by noise of the painting, (3, n, 3, n); None where it
-    has next to none.
-
-    A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is the
-    variance of the residual from pixel to pixel, less the variance of the prediction
-    (residuals.py).
-    """
-    weight = solution.problem.squares.weight
-    weight = weight.reshape(-1, weight.shape[2])
-    residuals, everything = Residuals.of(solution), slice(0, len(weight))
-    residual, mixed = residuals.residual(everything), residuals.noise(everything)
-    size, counted = solution.basis.size, solution.importance > 0
-    roots = np.zeros(residual.shape)
-    for c in range(3):
-        D = weight[:, c % weight.shape[1]].astype(np.float64)
-        of_both, of_prediction = (
-            channel_grain((np.sqrt(D) * x[:, c]).reshape(size), counted).ravel()
-            for x in (residual, mixed)
-        )
-        roots[:, c] = np.sqrt(D * np.maximum(of_both - of_prediction, 0))
-    if np.square(roots).sum() <= MIN_PAINTING_NOISE * (weight * np.square(mixed)).sum():
-        return None
-    n, is_coupled, planes = len(solution.weights), _is_coupled(solution), solution.basis.planes
-    covariance = np.zeros((3, n, 3, n))
-    (step, kind), painted = block_of(planes), np.flatnonzero(counted)
-    for start in with_progress(range(0, painted.size, step)):
-        part = as_slice(painted[start : start + step])
-        lit = planes.pixels(part)
-        rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
-        for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
-            # Its noise, too, is the noise of paths, which carry all channels.
-            product = rows[c] @ rows[d].T
-            covariance[c, :, d] += product
-            if c != d:
-                covariance[d, :, c] += product.T
-    return covariance
 
 
 @dataclass(frozen=True)

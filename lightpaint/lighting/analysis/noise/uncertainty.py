@@ -40,10 +40,10 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
     denoised_matrix,
     gradient_bias,
     noise_sums,
-    painting_covariance,
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
+from lightpaint.lighting.analysis.noise.painting_noise import CORRELATION, PaintingNoise
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
@@ -257,7 +257,7 @@ class Uncertainty:
             at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
         painting_scatter: (n, 3), standard deviation by noise of the painting, where that is a
-            render or a photograph; more samples of the basis do not lower it.
+            render or a photograph, and by its filter; more samples of the basis do not lower it.
         interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
             limit it has one side, which is never empty.
         objective_error: (3,), standard deviation of the objective.
@@ -267,6 +267,8 @@ class Uncertainty:
         target_norm2: (3,), ‖Ψ‖², as a scale.
         untold: (n,), the lights that these samples do not determine: little of their light stands
             out from noise in what is painted, and their interval is wider than they are bright.
+        is_filtered: Whether the painting seems to be rendered with a wider reconstruction filter
+            than the box of a basis.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -285,6 +287,7 @@ class Uncertainty:
     excess: Doubles
     target_norm2: Doubles
     untold: Bools
+    is_filtered: bool = False
 
     __repr__ = short_repr
 
@@ -348,10 +351,10 @@ def error_bars(
     response = WeightResponse(solution, scatters, unbiased, weights + bias)
     spread = response.spread(noise.full_covariance)
     by_painting, moved = np.zeros((2, *weights.shape))
-    of_painting = painting_covariance(solution) if with_painting else None
-    if of_painting is not None:
-        by_painting = response.spread(of_painting).inside
-    del response, of_painting  # of many lights they are large
+    filter_share = 0.0
+    if with_painting:
+        by_painting, filter_share = _error_by_painting(solution, unbiased, weights + bias, response)
+    del response  # of many lights it is large
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
@@ -391,7 +394,22 @@ def error_bars(
         solution.norm2,
         (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | spread.is_far)
         & _is_wide(weights, interval),
+        filter_share > 0,
     )
+
+
+def _error_by_painting(
+    solution: Solution, unbiased: NormalEquations, weights: Doubles, response: WeightResponse
+) -> tuple[Doubles, float]:
+    """Return the standard deviations of the weights by noise and filter of the painting, (n, 3),
+    and the share of a wider filter in it.
+    """
+    painting = PaintingNoise.of(solution)
+    covariance, (share, by_filter) = painting.covariance(), painting.filter_error(unbiased, weights)
+    if covariance is None:
+        return np.abs(by_filter), share
+    covariance *= 1 + share * (CORRELATION - 1)
+    return _root(response.spread(covariance).inside, by_filter), share
 
 
 def _scatter_by_poses(solution: Solution, level_errors: Sequence[tuple[str, RGB]]) -> Doubles:

@@ -1,0 +1,121 @@
+"""A painting that Mitsuba rendered with its own filter is another picture than lights make."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+from scipy.ndimage import gaussian_filter
+
+import lightpaint as lp
+from lightpaint.lighting.analysis.noise.painting_noise import TAP, filtered
+from lightpaint.scene.runtime.variant import use_variant
+
+SIZE = (48, 64)
+Y, X = np.mgrid[: SIZE[0], : SIZE[1]]
+
+#: Two walls with an edge of light, and a lamp in view.
+LAMP = np.hypot(X - 20, Y - 12) < 3
+WALLS = np.where(X < 40, 0.1 + Y / 48, 0.02), np.where(X > 24, 0.1 + X / 64, 0.05) + 0.1 * (Y < 20)
+TRUE = np.array([[1.5, 1.0, 0.5], [0.4, 0.8, 1.2]])
+
+
+def sums_over_subpixels() -> float:
+    """The share of a Gaussian of σ = ½ pixel in the pixel beside, by a sum over its points."""
+    x = (np.arange(-4000, 4000) + 0.5) / 2000
+    weight = np.exp(-2 * x**2)
+    return float(weight[x > 0.5].sum() / weight.sum())
+
+
+def test_a_box_becomes_a_gaussian() -> None:
+    image = np.zeros((5, 5))
+    image[2, 2] = 1
+    line = np.array([0, TAP, 1 - 2 * TAP, TAP, 0])
+    np.testing.assert_allclose(filtered(image), np.outer(line, line), atol=1e-15)
+    assert pytest.approx(sums_over_subpixels(), abs=1e-4) == TAP  # 2 pixels hold all but 6e-5
+    # At the border as if it went on.
+    np.testing.assert_allclose(filtered(np.ones((3, 1))), 1, atol=1e-15)
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> lp.Basis:
+    """Two lights, the first of which is seen."""
+    images = np.repeat(np.stack(WALLS)[..., None], 3, axis=-1)
+    images[0][LAMP] = 12
+    halves = 0.01 * np.random.default_rng(0).normal(size=images.shape)
+    noise = 0.01 * np.random.default_rng(1).normal(size=images.shape)
+    return make_basis(images=images + noise, half_differences=halves, seen=LAMP)
+
+
+def bars_of(basis: lp.Basis, image: Any) -> lp.Uncertainty:
+    """Error bars of the answer to a painting of all pixels but the lamp."""
+    bars = lp.error_bars(lp.correct_noise(lp.solve(basis, lp.Target.of(image), literal=True)))
+    assert bars is not None
+    return bars
+
+
+def picture() -> Any:
+    """The picture of these lights, (h, w, 3), without noise."""
+    image = np.einsum("nhw,nc->hwc", np.stack(WALLS), TRUE)
+    image[LAMP] = 12 * TRUE[0]
+    return image
+
+
+@pytest.mark.parametrize("sigma", [None, 0.45])
+def test_intervals_reach_as_far_as_a_filter_moves_lights(
+    basis: lp.Basis, sigma: float | None
+) -> None:
+    image = picture()
+    if sigma is None:
+        image = np.stack([filtered(image[..., c]) for c in range(3)], axis=-1)
+    else:
+        image = gaussian_filter(image, (sigma, sigma, 0))
+    bars = bars_of(basis, image)
+    off = np.abs(bars.weights - TRUE)
+    # By far more than by noise of the basis, and as told: to a tenth, since the halo is nearly all.
+    assert (off > 5 * bars.scatter).any()
+    assert bars.painting_scatter.max() == pytest.approx(off.max(), rel=0.15)
+    low, high = bars.interval
+    assert ((low <= TRUE) & (high >= TRUE)).all()
+    assert bars.is_filtered
+
+
+def test_a_box_and_a_brush_are_no_filter(basis: lp.Basis) -> None:
+    stroke = 1 + 0.5 * np.clip((14 - np.hypot(X - 30, Y - 24)) / 6, 0, 1)[..., None]
+    glow = 1.0 * gaussian_filter(LAMP * 1.0, 6)[..., None]
+    for image in (picture(), picture() * stroke, picture() + glow):
+        bars = bars_of(basis, image)
+        # Flat sums of noise of the painting are below the noise of the basis.
+        assert (bars.painting_scatter < bars.scatter).all()
+        assert not bars.is_filtered
+
+
+def test_paint_that_lacks_the_texture_of_the_scene_is_no_filter(make_basis: Any) -> None:
+    """It lacks more of it than a filter would take."""
+    rng = np.random.default_rng(0)
+    basis = make_basis(3, half_differences=0.01 * rng.normal(size=(3, 12, 10, 3)))
+    assert not bars_of(basis, 0.5 + 0.1 * rng.normal(size=(12, 10, 3))).is_filtered
+
+
+@pytest.mark.nightly
+def test_renders_of_mitsuba(tmp_path: Path) -> None:
+    """The levels are those of the painting; only its filter differs from the filter of the basis.
+
+    Seen are halos of a panel, and edges of shadows.
+    """
+    use_variant()
+    import mitsuba as mi
+
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["beam"]
+    for film, is_wide in (('<rfilter type="gaussian"/>', True), ('<rfilter type="box"/>', False)):
+        path = write_room(tmp_path, lights=lights, film=film)
+        basis = lp.render_basis(lp.load_scene(path), spp=1024, seed=1)
+        image = np.array(mi.render(mi.load_file(str(path)), spp=4096, seed=2))[..., :3]
+        bars = bars_of(basis, image)
+        low, high = bars.interval
+        held = (low <= basis.current_weights) & (basis.current_weights <= high)
+        # Nine channels; one may miss by chance.
+        assert held.sum() >= 8
+        by_painting = (bars.painting_scatter / basis.current_weights).max()
+        assert (by_painting > 0.05) == bars.is_filtered == is_wide
