@@ -21,8 +21,9 @@ from lightpaint.threads import one_thread, parallel_map
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
 BLOCK_PIXELS = 2**13
 
-#: Number of lights up to which the product of a block is too small for BLAS to use threads.
-FEW_LIGHTS = 256
+#: Number of lights up to which the product of a block is too small for BLAS to use threads; and
+#: from which noisy planes are multiplied in float32.
+FEW_LIGHTS, MIN_SINGLE_LIGHTS = 256, 128
 
 #: Rows of a strip of which some pixels are collected, and the maximum number of bytes of these.
 THINNED_ROWS, THINNED_MAX_BYTES = 8, 2**27
@@ -426,7 +427,7 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     to 10⁻⁶ of M, is far below the round-off of half floats; sums over blocks are float64 all the
     same.
     """
-    if planes.count <= FEW_LIGHTS or not planes.is_noisy:
+    if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64
     return BLOCK_PIXELS // 2, np.float32
 

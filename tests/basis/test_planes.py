@@ -255,7 +255,7 @@ def test_sums_of_many_lights_have_the_round_off_of_singles(monkeypatch: pytest.M
     planes = RoundedPlanes(rng.random((N, 120, 90, 3), np.float32))
     squares = rng.random((120, 90)), rng.random((120, 90, 3))
     exact = planes.sums(*squares)
-    monkeypatch.setattr("lightpaint.basis.planes.FEW_LIGHTS", N - 1)
+    monkeypatch.setattr("lightpaint.basis.planes.MIN_SINGLE_LIGHTS", N)
     for found, expected in zip(planes.sums(*squares), exact, strict=True):
         assert found.dtype == np.float64
         # A product of 4096 numbers in float32, whose errors add up at random.

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint import progress
 from lightpaint.basis.file import lit_planes
 from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
@@ -98,6 +99,32 @@ def test_error_bars_of_folded_pixels_are_those_of_all(
     np.testing.assert_allclose(
         few / scale[:, :, None, None] / scale, exact / scale[:, :, None, None] / scale, atol=spread
     )
+
+
+def test_each_block_of_the_parts_is_reported(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A part, of which several are summed at a time, takes seconds with hundreds of lights."""
+    monkeypatch.setattr(progress, "QUIET_S", 0)
+    monkeypatch.setattr("lightpaint.basis.planes.BLOCK_PIXELS", 10)
+    monkeypatch.setattr(basis_noise, "BLOCK_PIXELS", 10)
+    rng = np.random.default_rng(7)
+    images = rng.random((N, *SIZE, 3)).astype(np.float32)
+    basis = make_basis(images=images, half_differences=images / 10)
+    target = Target("t", images[0], np.ones(SIZE, np.float32), everything=True)
+    solution, steps = solve(basis, target, literal=True), []
+
+    class Listener:
+        def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+            steps.append((done, total, unit))
+
+        say = note = at_work = lambda *_: None
+
+    with progress.stage("error bars", Listener()):
+        noise_sums(solution)
+    blocks = -(-SIZE[0] * SIZE[1] // 10)
+    assert blocks > basis_noise.PARTS
+    assert sorted(steps[:blocks]) == [(k, blocks, "blocks") for k in range(1, blocks + 1)]
 
 
 @pytest.mark.parametrize("unit", [1.0, 2.0**24, 2.0**-24])

@@ -12,6 +12,7 @@ whole, from the pixel beside, which shows nearly the same by other samples (docs
 sure").
 """
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -41,7 +42,7 @@ from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residua
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.progress import with_progress
+from lightpaint.progress import counting, with_progress
 from lightpaint.threads import one_thread, parallel_map
 
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
@@ -139,10 +140,13 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
         # The same parts on every machine, added in order, give the same bits.
         length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
         parts = [counted[k : k + length] for k in range(0, counted.size, length)]
-        for of_part in parallel_map(
-            lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts"
-        ):
-            sums.add(of_part)
+        step, _ = block_of(pixels.planes)
+        blocks = sum(-(-part.size // step) for part in parts)
+        with counting(blocks, "blocks") as advance:
+            for of_part in parallel_map(
+                lambda x: pixels.sums(x, is_coupled=is_coupled, advance=advance), parts
+            ):
+                sums.add(of_part)
     error, noise = np.zeros((2, 3))
     for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
@@ -226,20 +230,28 @@ class NoisyPixels:
         is_exact = len(self.weights) < MIN_SINGLE_LIGHTS or not self.planes.is_noisy
         return np.float64 if is_exact else np.float32
 
-    def sums(self, counted: Indices, *, is_coupled: bool) -> NoiseSums:
-        """Sum over some pixels."""
+    def sums(self, counted: Indices, *, is_coupled: bool, advance: Callable[[], None]) -> NoiseSums:
+        """Sum over some pixels. advance: called after each block of them."""
         sums = NoiseSums.zeros(len(self.weights))
-        self.add(counted, sums, is_coupled=is_coupled)
+        self.add(counted, sums, is_coupled=is_coupled, advance=advance)
         return sums
 
-    def add(self, counted: Indices, sums: NoiseSums, *, is_coupled: bool) -> None:
-        """Add some pixels to sums."""
+    def add(
+        self,
+        counted: Indices,
+        sums: NoiseSums,
+        *,
+        is_coupled: bool,
+        advance: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Add some pixels to sums. advance: see `sums`."""
         n, (step, _) = len(self.weights), block_of(self.planes)
         rooms = Rooms(n, n * min(step, counted.size), self._kind, are_kept=is_coupled)
         with one_thread():
             for start in with_progress(range(0, counted.size, step)):
                 pixels = as_slice(counted[start : start + step])
                 self._add_block(pixels, sums, rooms, is_coupled=is_coupled)
+                advance()
 
     def _add_block(
         self, pixels: slice | Indices, sums: NoiseSums, rooms: Rooms, *, is_coupled: bool
