@@ -118,9 +118,6 @@ class Planes(Protocol):
         squares: computes weights and image of a block from the light in it.
         """
 
-    def squares(self) -> Doubles:
-        """Return Σ Φ² over all pixels and channels, (n,)."""
-
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) float64 each, in
         one walk. mask: (h, w).
@@ -193,11 +190,6 @@ class PlanesBase:
 
         parallel_map(fill, range(0, pixels, BLOCK_PIXELS), unit="blocks")
         return mixed
-
-    def squares(self) -> Doubles:
-        """Return Σ Φ² over all pixels and channels, (n,)."""
-        power, _ = self.power_and_totals(np.ones(self.size, np.bool_))
-        return np.asarray(power.sum(axis=1))
 
     @one_thread()
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:

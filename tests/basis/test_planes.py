@@ -88,7 +88,8 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
     expected_power = np.square(exact)[:, mask].sum(axis=1)
     np.testing.assert_allclose(power, expected_power, rtol=1e-5 + tolerance)
     np.testing.assert_allclose(totals, exact.sum(axis=(1, 2)), rtol=1e-5 + tolerance)
-    np.testing.assert_allclose(planes.squares(), np.square(exact).sum(axis=(1, 2, 3)), rtol=1e-5)
+    lit = [np.square(planes.lit_plane(k)[1], dtype=np.float64).sum() for k in range(n)]
+    np.testing.assert_allclose(lit, np.square(exact).sum(axis=(1, 2, 3)), rtol=1e-5)
     psi, weight = rng.random((height, width, 3)), rng.random((height, width))
     weight[2:4] = 0
     M, b, norm2 = planes.sums(weight, psi)
@@ -509,7 +510,7 @@ def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     # Strips of seven rows, of which a chunk has sixteen.
     strips = 7 * file_planes.STRIP_CACHE_COUNT * 12 * N * PLAIN[1]
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", strips)
-    planes.squares()
+    planes.power_and_totals(np.ones(PLAIN, np.bool_))
     assert len(unpacked) == N * -(-PLAIN[0] // 16)
 
 

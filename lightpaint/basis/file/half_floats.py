@@ -157,6 +157,12 @@ class EncodedPlanes(RowPlanes):
         self._decode(i, slice(None), image.reshape(-1, 3).T)
         return image
 
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+        if self._singles is None:
+            return super().lit_plane(i)
+        return slice(None), self._singles[i]
+
     @property
     def _singles(self) -> npt.NDArray[np.float32] | None:
         """All planes decoded, (n, 3, pixels), once for all walks; None if that takes much

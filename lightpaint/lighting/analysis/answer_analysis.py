@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Bools, Doubles
-from lightpaint.basis import texel_lights
+from lightpaint.arrays import RGB, Bools, Doubles, Indices
+from lightpaint.basis import Basis, Planes, texel_lights
 from lightpaint.display_text import short_repr
 from lightpaint.images import in_turns
 from lightpaint.keywords import keywords
@@ -41,6 +41,9 @@ ALIKE = 1e-6
 
 #: The largest `alike` that noise justifies.
 MAX_ALIKE = 0.01
+
+#: Number of lights whose shares of noise tell about the others.
+SHARE_LIGHTS = 32
 
 #: Smallest share of a light in a mix that cancels for it to be a part of the mix.
 MIN_PART = 0.05
@@ -80,12 +83,22 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     basis = solution.basis
     # Neighbouring texels are alike by nature, and the expectation of their image decides.
     free = np.flatnonzero(~basis.is_fixed & ~texel_lights(basis.lights))
-    noise, power = (planes.squares()[free] for planes in (basis.noise, basis.planes))
-    shares = noise[power > 0] / power[power > 0]
+    shares = _noise_shares(basis, free[:: max(1, -(-free.size // SHARE_LIGHTS))])
     alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE
     # Strong noise would make different images look alike.
     M = solution.equations.M[:, free][:, :, free]
     return indistinguishable(M, [basis.names[k] for k in free], alike=min(alike, MAX_ALIKE))
+
+
+def _noise_shares(basis: Basis, lights: Indices) -> Doubles:
+    """Return Σ h² / Σ Φ² of those of some lights that shine anywhere."""
+
+    def powers(planes: Planes) -> Doubles:
+        lit = (planes.lit_plane(int(k))[1] for k in lights)
+        return np.array([np.square(values, dtype=np.float64).sum() for values in lit])
+
+    noise, power = powers(basis.noise), powers(basis.planes)
+    return np.asarray(noise[power > 0] / power[power > 0])
 
 
 def indistinguishable(

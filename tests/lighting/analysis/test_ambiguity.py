@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
+from lightpaint.lighting.analysis import answer_analysis
 from lightpaint.lighting.analysis.answer_analysis import ambiguities, indistinguishable
 from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
@@ -72,7 +74,12 @@ def test_one_channel_and_no_lights():
     assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
 
 
-def test_two_lights_at_one_place_are_named_in_spite_of_noise():
+@pytest.mark.parametrize("share_lights", [3, 1])
+def test_two_lights_at_one_place_are_named_in_spite_of_noise(
+    monkeypatch: pytest.MonkeyPatch, share_lights: int
+):
+    """Also where the noise of some lights has to tell about the others."""
+    monkeypatch.setattr(answer_analysis, "SHARE_LIGHTS", share_lights)
     rng = np.random.default_rng(0)
     clean = rng.random((3, 16, 16, 3))
     clean[2] = clean[0]
