@@ -30,6 +30,7 @@ from lightpaint.images.formats.exr_rows import RowFile
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.lit_pixels import bin_pixels
 from lightpaint.lighting.problem import Problem
+from lightpaint.progress import cancellable
 
 PACKAGE = Path(lightpaint.__file__).parent
 
@@ -350,6 +351,26 @@ def test_means_of_lit_pixels_are_those_of_all_pixels(
         assert isinstance(means, BlockPlanes) == (limit == 0)
         np.testing.assert_allclose(means.array(), expected, rtol=1e-6)
         np.testing.assert_allclose(means.rows(1, 2), expected[:, 1:2], rtol=1e-6)
+
+
+def test_work_on_lit_pixels_is_stopped_between_strips(images: np.ndarray) -> None:
+    """As where a painter ends while it reads a thousand lights."""
+
+    class StopError(Exception):
+        pass
+
+    def stop() -> None:
+        raise StopError
+
+    def lit() -> LitPlanes:
+        return LitPlanes([LitPlane.of(np.moveaxis(x, -1, 0), 1.0) for x in images], SIZE)
+
+    planes = lit()
+    with cancellable(stop):
+        with pytest.raises(StopError):
+            lit()
+        with pytest.raises(StopError):
+            block_means(planes, np.ones(SIZE), 2)
 
 
 def test_no_more_rows_are_averaged_at_a_time_than_a_chunk_has(

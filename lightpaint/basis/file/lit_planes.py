@@ -206,10 +206,11 @@ class LitPlanes(RowPlanes):
         kind = np.float16 if self._is_noisy else np.float32
         nothing = LitPlane(np.zeros(0, np.uint32), np.zeros((3, 0), kind), 1.0)
         same = [nothing if i in self._clean else x.in_kind(kind) for i, x in enumerate(planes)]
-        cuts = [np.searchsorted(plane.pixels, np.array(edges, np.uint32)) for plane in same]
+        # As lists, of which there are hundreds of thousands of slices.
+        cuts = [np.searchsorted(x.pixels, np.array(edges, np.uint32)).tolist() for x in same]
         self._lit = [
-            _LitStrip.of(same, [slice(*cut[k : k + 2]) for cut in cuts], slice(*ends))
-            for k, ends in enumerate(pairwise(edges))
+            _LitStrip.of(same, [slice(cut[k], cut[k + 1]) for cut in cuts], slice(*ends))
+            for k, ends in enumerate(with_progress(list(pairwise(edges)), "strips"))
         ]
 
     @property
