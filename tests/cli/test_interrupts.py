@@ -123,9 +123,11 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         if number == signal.SIGINT:
             assert time.monotonic() - stopped_s < 3
             assert code == 130
-            assert errors.startswith("lightpaint basis: interrupted")
-            assert "are kept; run the same command to continue" in errors
-            assert errors.count("\n") == 1
+            *remarks, line = errors.splitlines()
+            assert line.startswith("lightpaint basis: interrupted")
+            assert line.endswith("are kept; run the same command to continue")
+            # Where that takes more than a minute, it has been said.
+            assert all(x.startswith("lightpaint: rendering takes") for x in remarks)
         [path] = kept_bases(tmp_path, "stopped")
         part = read_basis(path)
         assert part.origin.method == method
