@@ -1,6 +1,6 @@
 """Processor time of an answer under wishes for lux, against the answer without them.
 
-    python benchmarks/wishes.py [--lights 60] [--lamps whites] [--points 2000] [--size 160x90]
+    python benchmarks/wishes.py [--lights 60] [--lamps whites] [--points 2000] [--size 640x360]
 
 Draws a hall (hall.py) of so many lights, renders a basis of that size and measures the illuminance
 at about that many points of its floor, 0.8 m high. Each lamp mixes a warm and a cool white, or has
@@ -76,9 +76,9 @@ def main() -> None:
     if options.painting == "bands":
         image = with_bands(image)
     target = Target("levels", image, np.ones(basis.size, np.float32), everything=True)
-    for name, fit in FITS.items():
+    for name in options.fits:
         limits = constraints[options.lamps]
-        compare(name, Problem.of(basis, target, constraints=limits, fit=fit), measured)
+        compare(name, Problem.of(basis, target, constraints=limits, fit=FITS[name]), measured)
 
 
 def with_bands(image: Floats) -> Floats:
@@ -132,8 +132,9 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--lamps", choices=("whites", "colors", "limits"), default="whites")
     parser.add_argument("--painting", choices=("levels", "bands"), default="levels")
     parser.add_argument("--points", type=int, default=2000)
-    parser.add_argument("--size", default="160x90")
+    parser.add_argument("--size", default="640x360")
     parser.add_argument("--spp", type=int, default=8)
+    parser.add_argument("--fits", nargs="+", choices=FITS, default=[*FITS])
     return parser.parse_args()
 
 
