@@ -99,7 +99,7 @@ def _price(equations: NormalEquations, reduction: Reduction) -> float:
     black = float(equations.target_norm2.sum())
     _, high = reduction.weight_ranges
     at_full = float(equations.objective(np.where(np.isfinite(high), high, 0.0)).sum())
-    return min(max(black, at_full), MOST_LOSS * black) / SECOND
+    return (min(max(black, at_full), MOST_LOSS * black) or at_full or 1.0) / SECOND
 
 
 def _share_sizes(wished: WishedLight) -> Doubles:

@@ -135,6 +135,31 @@ def test_wishes_beyond_all_lamps_are_met_as_far_as_they_go(make_basis):
     assert solution.weights == pytest.approx(np.ones((LAMPS, 3)), abs=SAME)
 
 
+@pytest.mark.parametrize("asked", [500.0, 5000.0])
+def test_a_black_painting_meets_as_much_as_any(make_basis, asked):
+    """What a wish costs is no share of the painting's own light alone."""
+    basis, target, illuminance = _case(make_basis, [_plane("desk", 8, mean=asked)])
+    black = replace(target, image=np.zeros_like(target.image))
+    problem = Problem.of(basis, black, constraints=_lamps(LAMPS), fit=Fit(literal=True))
+    wished = wished_light(illuminance, PowerBudget(), problem.reduction)
+    required = with_wishes(problem, wished)
+    weights = solution_of(required.problem).weights
+    at_full = illuminance.reading("desk", np.ones((LAMPS, 3))).mean
+    reached = illuminance.reading("desk", weights).mean
+    assert reached == pytest.approx(min(asked, at_full), rel=SAME)
+
+
+def test_lights_that_all_stay_give_what_they_give(make_basis):
+    basis, target, illuminance = _case(make_basis, [_plane("desk", 8, mean=5000.0)])
+    locked = Constraints.of({"*": {"lock": True}})
+    problem = Problem.of(basis, target, constraints=locked, fit=Fit(literal=True))
+    wished = wished_light(illuminance, PowerBudget(), problem.reduction)
+    required = with_wishes(problem, wished)
+    now = illuminance.reading("desk", basis.lights.current_weights).mean
+    assert required.shares == pytest.approx([1 - now / 5000], rel=SAME)
+    assert solution_of(required.problem).weights == pytest.approx(basis.lights.current_weights)
+
+
 def test_a_budget_is_kept_where_light_is_given_up(make_basis):
     desk = _plane("desk", 8, mean=5000.0)
     basis, _, illuminance = _case(make_basis, [desk])
