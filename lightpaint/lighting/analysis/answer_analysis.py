@@ -91,7 +91,7 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
 
 
 def _noise_shares(basis: Basis, lights: Indices) -> Doubles:
-    """Return Σ h² / Σ Φ² of those of some lights that shine anywhere."""
+    """Return Σ h² / Σ Φ² of some lights, where they shine."""
 
     def powers(planes: Planes) -> Doubles:
         lit = (planes.lit_plane(int(k))[1] for k in lights)
