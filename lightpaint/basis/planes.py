@@ -21,9 +21,10 @@ from lightpaint.threads import one_thread, parallel_map
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
 BLOCK_PIXELS = 2**13
 
-#: Number of lights up to which the product of a block is too small for BLAS to use threads; and
-#: from which noisy planes are multiplied in float32.
-FEW_LIGHTS, MIN_SINGLE_LIGHTS = 256, 128
+#: Number of lights up to which the product of a block is too small for BLAS to use threads; from
+#: which noisy planes are multiplied in float32; and from which a block has fewer pixels, since its
+#: matrices, of several channels at a time, would take most of the memory of a solve.
+FEW_LIGHTS, MIN_SINGLE_LIGHTS, LARGE_BLOCK_LIGHTS = 256, 128, 512
 
 #: Rows of a strip of which some pixels are collected, and the maximum number of bytes of these.
 THINNED_ROWS, THINNED_MAX_BYTES = 8, 2**27
@@ -421,7 +422,7 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     """
     if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64
-    return BLOCK_PIXELS // 2, np.float32
+    return BLOCK_PIXELS // (2 if planes.count < LARGE_BLOCK_LIGHTS else 4), np.float32
 
 
 def as_slice(pixels: Indices, *, spare: int = 0) -> slice | Indices:

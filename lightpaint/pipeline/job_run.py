@@ -177,6 +177,7 @@ def answer_job(
         if planes is not None and required is not None:
             on_planes = answer_on_planes(solution, planes, required)
         solution.problem.squares.release()
+        release_freed_memory()  # by error bars, before the report needs as much
         lighting = with_findings(solution, analyses).lighting
         return JobAnswer(solution, analyses, lighting, on_planes)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
-from lightpaint.basis import Basis, Planes, texel_lights
+from lightpaint.basis import FEW_LIGHTS, Basis, Planes, texel_lights
 from lightpaint.display_text import short_repr
 from lightpaint.images import in_turns
 from lightpaint.keywords import keywords
@@ -231,8 +231,7 @@ def analyse(
     ]
     # All of them ask for it.
     solution.basis.predict(solution.weights)
-    # The jobs are independent, and each leaves a processor idle now and then.
-    answers = iter(in_turns(lambda job: _run_stage(*job), jobs, solution.basis.size))
+    answers = iter(_run_stages(jobs, solution))
     looked_at: list[tuple[Appearance, Diagnosis]] = [next(answers) for _ in views]
     appearances = [view_appearance for view_appearance, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]
@@ -259,6 +258,17 @@ def analyse(
             Analysis(certified, uncertainty, diagnosis, view_appearance, alike, free, colors)
         )
     return tuple(analyses)
+
+
+def _run_stages(jobs: Sequence[tuple[str, Callable[[], Any]]], solution: Solution) -> list[Any]:
+    """Return the result of each job, with the label of its stage.
+
+    The jobs are independent, and each leaves a processor idle now and then. Of many lights each has
+    hundreds of megabytes of matrices, and sums that several processors share.
+    """
+    if len(solution.weights) > FEW_LIGHTS:
+        return [_run_stage(*job) for job in jobs]
+    return in_turns(lambda job: _run_stage(*job), jobs, solution.basis.size)
 
 
 def _run_stage(label: str, work: Callable[[], Any]) -> Any:

@@ -8,7 +8,7 @@ import pytest
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.analysis import answer_analysis
-from lightpaint.lighting.analysis.answer_analysis import ambiguities, indistinguishable
+from lightpaint.lighting.analysis.answer_analysis import ambiguities, analyse, indistinguishable
 from lightpaint.lighting.default_solve import solve
 from lightpaint.target.painted_target import Target
 
@@ -74,12 +74,8 @@ def test_one_channel_and_no_lights():
     assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
 
 
-@pytest.mark.parametrize("share_lights", [3, 1])
-def test_two_lights_at_one_place_are_named_in_spite_of_noise(
-    monkeypatch: pytest.MonkeyPatch, share_lights: int
-):
-    """Also where the noise of some lights has to tell about the others."""
-    monkeypatch.setattr(answer_analysis, "SHARE_LIGHTS", share_lights)
+def _noisy_basis() -> Basis:
+    """Three lights, of which the first and the last are at one place."""
     rng = np.random.default_rng(0)
     clean = rng.random((3, 16, 16, 3))
     clean[2] = clean[0]
@@ -90,8 +86,44 @@ def test_two_lights_at_one_place_are_named_in_spite_of_noise(
     )
     origin = Origin("s", "", "c", 0, "one pass", (8, 8), (1, 1))
     emitter_mask = np.zeros((16, 16), dtype=bool)
-    basis = Basis(lights, images, noise[1].astype(np.float32), emitter_mask, origin)
+    return Basis(lights, images, noise[1].astype(np.float32), emitter_mask, origin)
+
+
+@pytest.mark.parametrize("share_lights", [3, 1])
+def test_two_lights_at_one_place_are_named_in_spite_of_noise(
+    monkeypatch: pytest.MonkeyPatch, share_lights: int
+):
+    """Also where the noise of some lights has to tell about the others."""
+    monkeypatch.setattr(answer_analysis, "SHARE_LIGHTS", share_lights)
+    basis = _noisy_basis()
     target = Target("t", basis.mix(np.ones((3, 3))), np.ones((16, 16), np.float32), False)
     [ambiguity] = ambiguities(solve(basis, target))
     assert ambiguity.names == ("a", "c")
     assert not ambiguity.is_mix
+
+
+def test_the_analysis_of_many_lights_is_that_of_few(monkeypatch: pytest.MonkeyPatch):
+    """Its parts come one after the other then, which needs less memory."""
+    basis = _noisy_basis()
+    image = basis.mix(np.full((3, 3), 0.7)) + np.float32(0.1)
+    solution = solve(basis, Target("t", image, np.ones((16, 16), np.float32), everything=False))
+    [few] = analyse(solution)
+    running: list[str] = []
+    run_stage = answer_analysis._run_stage
+
+    def alone(label: str, work: Any) -> Any:
+        assert running == []
+        running.append(label)
+        result = run_stage(label, work)
+        running.clear()
+        return result
+
+    monkeypatch.setattr(answer_analysis, "FEW_LIGHTS", 2)
+    monkeypatch.setattr(answer_analysis, "_run_stage", alone)
+    [many] = analyse(solution)
+    assert few.uncertainty is not None
+    assert many.uncertainty is not None
+    errors = many.uncertainty.standard_error, few.uncertainty.standard_error
+    np.testing.assert_array_equal(*errors)
+    assert many.ambiguities == few.ambiguities != ()
+    assert many.appearance.delta_e == few.appearance.delta_e
