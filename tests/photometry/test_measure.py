@@ -118,7 +118,9 @@ def test_a_furnace_has_pi_times_its_radiance(tmp_path: Path) -> None:
     """L / (1 − ρ) from everywhere, in each direction, also of a cylinder, in its own colour.
 
     Mitsuba's own `path` in `llvm_ad_rgb` gives .06 to .09 % too much in a sphere that shines
-    inwards, and so does this; in a cube, and in `scalar_rgb`, nothing.
+    inwards, and so does this: on the sphere the density of a direction is not always the density of
+    its sample (findings/mitsuba_sphere_shining_inwards_has_two_densities.sh). In a cube, and in
+    `scalar_rgb`, nothing.
     """
     planes = [
         plane_of(POINTS, name="up"),
