@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Mitsuba 3.9.1 (mitsuba==3.9.1 with its Dr.Jit, numpy==2.4.6), variant llvm_ad_rgb with LLVM 23.1.
+# mitsuba 3.9.1, variant llvm_ad_rgb with LLVM 23.1 (karellen-llvm-core 23.1.4.post8), Linux x86-64.
 #
 # Surfaces of a furnace, a sphere of radiance 1 that shines inwards (`flip_normals`), have the
 # irradiance π. One expects `pdf_emitter_direction` to be the density that
@@ -18,7 +18,10 @@ unset PYTHONPATH
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet --disable-pip-version-check mitsuba==3.9.1 numpy==2.4.6
+"$folder/venv/bin/pip" install --quiet --disable-pip-version-check mitsuba==3.9.1 numpy==2.4.6 \
+  karellen-llvm-core==23.1.4.post8
+DRJIT_LIBLLVM_PATH=$(find "$folder/venv" -name "libLLVM*.so*" | sort | head -n 1)
+export DRJIT_LIBLLVM_PATH
 "$folder/venv/bin/python" - <<'PYTHON'
 import sys
 
