@@ -598,7 +598,7 @@ def print_starts(scene: str, times: int, *, with_exact: bool = False) -> None:
         # As installed packages have it, and a source tree may not.
         environment = {
             **os.environ,
-            "LIGHTPAINT_CACHE": folder,
+            "LIGHTPAINT_CACHE": f"{folder}/cache",  # which holds nothing else
             "PYTHONPYCACHEPREFIX": f"{folder}/py",
         }
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -668,7 +668,7 @@ def started(
         times += [time.perf_counter() - begin, largest_gb(painter.pid)]
     if is_first:
         until, kept = time.monotonic() + 600, "*.opening.npz" if is_saved(scene) else "*.clean.npz"
-        while not list(Path(folder).glob(kept)) and time.monotonic() < until:
+        while not list(Path(folder, "cache").glob(kept)) and time.monotonic() < until:
             time.sleep(0.5)
     page.context.close()
     painter.terminate()
