@@ -13,7 +13,7 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_sums import DRAFTS_PER_SUM, SmallFilm
 from lightpaint.paint import protocol
 from lightpaint.paint.session import picture_table
-from lightpaint.paint.session.draft_pictures import FLOOR
+from lightpaint.paint.studio.mixed_pictures import FLOOR
 
 H, W, N, BLOCK = 24, 36, 5, 4
 

@@ -40,9 +40,8 @@ from lightpaint.lighting.linear_problem import (
     whites_for,
 )
 from lightpaint.lighting.linear_solve import at_slots, solve_linear
-from lightpaint.lighting.live.live_difference import LiveDifference
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
-from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.live.live_view import LiveDifference, LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import block_side

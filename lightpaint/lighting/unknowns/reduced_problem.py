@@ -12,17 +12,21 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS
-from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.optimum import (
     TOLERANCE,
+    Method,
     Optimum,
     QuadraticFamily,
     minimise,
     minimise_each,
 )
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
-from lightpaint.lighting.algebra.required_sums import CLOSE, MAX_UPDATES, RequiredSums
-from lightpaint.lighting.algebra.sums_with_shares import SumsWithShares
+from lightpaint.lighting.algebra.required_sums import (
+    CLOSE,
+    MAX_UPDATES,
+    RequiredSums,
+    SumsWithShares,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction

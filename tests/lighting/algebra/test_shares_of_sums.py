@@ -9,8 +9,7 @@ from qp import least
 from scipy.optimize import linprog
 
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.algebra.required_sums import RequiredSums
-from lightpaint.lighting.algebra.sums_with_shares import SumsWithShares
+from lightpaint.lighting.algebra.required_sums import RequiredSums, SumsWithShares
 
 #: Both active sets end at 1e-10 of the sums' size, and HiGHS at 1e-7.
 SAME = 1e-6
