@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +17,10 @@ from lightpaint.lighting.algebra.clipped_newton import (
 from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
-
-#: Newton's method on the active set, which falls back on the paper's iteration; or that one alone.
-Method = Literal["polished", "gauss-seidel"]
 
 #: Largest KKT residual of an optimum, unless the round-off of M x − b is larger.
 TOLERANCE = 1e-12

@@ -30,7 +30,8 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.dual_active_set import DualActiveSet, NearAnswer
-from lightpaint.lighting.algebra.optimum import TOLERANCE, Method, Optimum, QuadraticFamily
+from lightpaint.lighting.algebra.method import Method
+from lightpaint.lighting.algebra.optimum import TOLERANCE, Optimum, QuadraticFamily
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.progress import cancellation_check
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.optimum import (
     TOLERANCE,
-    Method,
     Optimum,
     QuadraticFamily,
     minimise,
