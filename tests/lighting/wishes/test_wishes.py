@@ -137,7 +137,7 @@ def test_wishes_beyond_all_lamps_are_met_as_far_as_they_go(make_basis):
 
 @pytest.mark.parametrize("asked", [500.0, 5000.0])
 def test_a_black_painting_meets_as_much_as_any(make_basis, asked):
-    """What a wish costs is no share of the painting's own light alone."""
+    """The price of giving up a wish must not vanish with the light of the painting."""
     basis, target, illuminance = _case(make_basis, [_plane("desk", 8, mean=asked)])
     black = replace(target, image=np.zeros_like(target.image))
     problem = Problem.of(basis, black, constraints=_lamps(LAMPS), fit=Fit(literal=True))
