@@ -237,8 +237,7 @@ class SumsWithShares:
     """Problems as `RequiredSums` has them, with shares of sums that may be given up.
 
     shares: (j,), to begin with. sizes: (m, j), S, by how much giving up all of a share lowers each
-    sum. price: p, of a whole
-    share, in the unit of the objective.
+    sum. price: p, of a whole share, in the unit of the objective.
     """
 
     def __init__(

@@ -26,6 +26,9 @@ from lightpaint.target import Target
 #: Pixels of a part of a row over which importance is summed.
 SEGMENT_PIXELS = 64
 
+#: Approximate number of blocks that are compared with the paint.
+COMPARED_BLOCKS = 2**10
+
 
 class LiveView:
     """A view whose painting changes under a brush, updated in place.
@@ -201,10 +204,6 @@ class LiveView:
         for k, values in enumerate((a, unpainted)):
             if a.size:
                 self._sums[rows, first:last, k] = np.add.reduceat(values, starts, axis=1)
-
-
-#: Approximate number of blocks that are compared.
-COMPARED_BLOCKS = 2**10
 
 
 @dataclass(frozen=True)
