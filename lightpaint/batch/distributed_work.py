@@ -27,19 +27,8 @@ from lightpaint.basis.render import (
     with_first_hits,
 )
 from lightpaint.batch.engine import Engine
+from lightpaint.batch.work import work_items
 from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
-from lightpaint.batch.work.work_items import (
-    SAMPLE_S,
-    GuideTraining,
-    ItemResult,
-    PaintingOfSums,
-    PartOfBasis,
-    Passes,
-    SceneFilm,
-    SumsOfRows,
-    Task,
-    render_seconds,
-)
 from lightpaint.batch.work.worker_storage import Spool, WorkerCache
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images import Estimate
@@ -53,7 +42,7 @@ from lightpaint.scene.quality_presets import samples
 class PartwiseRender:
     """A `render_basis` for `obtain_basis` that renders one film by an engine."""
 
-    def __init__(self, engine: Engine, film: SceneFilm) -> None:
+    def __init__(self, engine: Engine, film: work_items.SceneFilm) -> None:
         self._engine = engine
         self._film = film.without_content()
 
@@ -98,7 +87,7 @@ class PartwiseRender:
         spool.drop()
         return basis
 
-    def _film_of(self, scene: Scene) -> SceneFilm:
+    def _film_of(self, scene: Scene) -> work_items.SceneFilm:
         """Return the film of `scene`, which may have only some of the lights."""
         return replace(self._film, light_names=scene.chosen)
 
@@ -122,8 +111,8 @@ class PartwiseRender:
             pixels = (part.bottom - part.top) * scene.size[1]
             lights = len(scene.lights) if part.light is None else 1
             samples = pixels * part.spp * (2 if part.half is None else 1)
-            expected_s = render_seconds(samples, lights)
-            item = PartOfBasis(
+            expected_s = work_items.render_seconds(samples, lights)
+            item = work_items.PartOfBasis(
                 f"part {k}", self._film_of(scene), part, seed, guide_file, expected_s
             )
             missing[item.name] = item
@@ -139,7 +128,7 @@ class PartwiseRender:
 
 def _obtain_guide_table(
     engine: Engine,
-    film: SceneFilm,
+    film: work_items.SceneFilm,
     scene: Scene,
     seed: int,
     start: Basis | None,
@@ -153,8 +142,8 @@ def _obtain_guide_table(
         return None
     table = spool.guide_table() if start is None else start.guide_table
     if table is None:
-        expected_s = render_seconds(sum(training_samples(scene)), len(scene.lights))
-        [result] = engine.run([GuideTraining("training", film, seed, expected_s)])
+        expected_s = work_items.render_seconds(sum(training_samples(scene)), len(scene.lights))
+        [result] = engine.run([work_items.GuideTraining("training", film, seed, expected_s)])
         if result.failure:
             raise BasisError(result.failure)
         table = result.value
@@ -165,13 +154,13 @@ def _obtain_guide_table(
 
 
 def solve_by_sums(
-    tasks: Sequence[Task], engine: Engine, cache: WorkerCache, listen: Listener
-) -> list[ItemResult]:
+    tasks: Sequence[work_items.Task], engine: Engine, cache: WorkerCache, listen: Listener
+) -> list[work_items.ItemResult]:
     """Solve looks that share one basis and request nothing but the lighting."""
     jobs: list[Job] = []
-    outcomes: list[ItemResult] = []
+    outcomes: list[work_items.ItemResult] = []
 
-    def make_job(task: Task) -> Callable[[], None]:
+    def make_job(task: work_items.Task) -> Callable[[], None]:
         return lambda: jobs.append(Job(**job_fields(task, cache)))
 
     runnable = []
@@ -195,7 +184,7 @@ def solve_by_sums(
 
 
 def _render_sums(
-    task: Task, jobs: Sequence[Job], engine: Engine, cache: WorkerCache, listen: Listener
+    task: work_items.Task, jobs: Sequence[Job], engine: Engine, cache: WorkerCache, listen: Listener
 ) -> list[Sums]:
     """Return the sums of each job's problem over all rows, added in the order of the rows."""
     scene, settings = jobs[0].views[0].scene, jobs[0].settings
@@ -204,30 +193,35 @@ def _render_sums(
     spp = scene.spp if requested_spp is None else requested_spp
     parts = plan_parts(scene, spp)
     file = replace(job_fields(task, cache)["scenes"][0])
-    film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, file.read_files)))
+    film = work_items.SceneFilm(
+        file, settings.quality, settings.resolution, tuple(map(str, file.read_files))
+    )
     spool = Spool(scene, parts, seed=settings.seed, start=None)
     _obtain_guide_table(engine, film, scene, settings.seed, None, spool)
     paintings = tuple(
-        PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
+        work_items.PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize)
+        for job in jobs
     )
     source_files = tuple(dict.fromkeys(str(x) for job in jobs for x in job.views[0].target.files))
     items = []
     for k, part in enumerate(parts):
         pixels = (part.bottom - part.top) * scene.size[1]
-        expected_s = render_seconds(2 * pixels * part.spp, len(scene.lights))
+        expected_s = work_items.render_seconds(2 * pixels * part.spp, len(scene.lights))
         options: dict[str, Any] = {"film": film, "part": part, "seed": settings.seed}
         options |= {
             "guide_file": str(spool.guide_file),
             "paintings": paintings,
             "files": source_files,
         }
-        items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
+        items.append(work_items.SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
     total = _add_in_order(items, engine, listen)
     spool.drop()
     return total
 
 
-def _add_in_order(items: Sequence[SumsOfRows], engine: Engine, listen: Listener) -> list[Sums]:
+def _add_in_order(
+    items: Sequence[work_items.SumsOfRows], engine: Engine, listen: Listener
+) -> list[Sums]:
     """Run items; return the sums of all rows. Raises BasisError if an item failed."""
     results: dict[str, list[Sums]] = {}
     total: list[Sums] = []
@@ -266,7 +260,7 @@ def _file_of(job: Job) -> Painting:
 
 
 def distributed_renderer(
-    engine: Engine, task: Task, variant: str | None, listen: Listener
+    engine: Engine, task: work_items.Task, variant: str | None, listen: Listener
 ) -> Callable[[Scene], Estimate]:
     """Return a function that renders a look's relit scene by `engine`, in ranges of passes.
 
@@ -290,9 +284,9 @@ def distributed_renderer(
         items = []
         for range_ in ranges_of(relit, passes):
             samples = height * width * sum(passes[k][1] for k in range_)
-            name, expected_s = f"{task.look} {range_.start}", samples * SAMPLE_S
+            name, expected_s = f"{task.look} {range_.start}", samples * work_items.SAMPLE_S
             bounds = range_.start, range_.stop
-            item = Passes(name, scene, task.final, *bounds, files, expected_s)
+            item = work_items.Passes(name, scene, task.final, *bounds, files, expected_s)
             items.append(replace(item, observer=relit.observer if relit.is_spectral else None))
         results = {}
         sums, next_item = np.zeros((2, height, width, 3), np.float64), 0

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis
+from lightpaint.batch import task_bases
 from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
 from lightpaint.batch.engine import Engine, InProcess, Processes
@@ -18,30 +19,10 @@ from lightpaint.batch.gallery.gallery_page import write_gallery, write_task_plan
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.manifest.keys import as_key
+from lightpaint.batch.plan import plan_steps
 from lightpaint.batch.plan.journal import Journal, JournalLine
-from lightpaint.batch.plan.plan_steps import (
-    Plan,
-    PlannedLook,
-    PlanStep,
-    by_bases,
-    look_seconds,
-    waves,
-)
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.task_bases import (
-    has_basis,
-    obtain_bases,
-    obtain_placed_bases,
-    save_bases,
-    save_former_looks,
-)
-from lightpaint.batch.work.item_execution import (
-    OUT_OF_MEMORY_TEXT,
-    attempt,
-    final_render,
-    is_disk_full,
-    job_fields,
-)
+from lightpaint.batch.work import item_execution
 from lightpaint.batch.work.work_items import ItemResult, Task
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
@@ -66,11 +47,11 @@ class BatchOutcome:
 
 
 def run_batch(
-    plan: Plan,
+    plan: plan_steps.Plan,
     options: RunOptions | None = None,
     progress: Progress = silent,
     *,
-    on_step: Callable[[PlannedLook, ItemResult], None] | None = None,
+    on_step: Callable[[plan_steps.PlannedLook, ItemResult], None] | None = None,
 ) -> BatchOutcome:
     """Run the remaining steps of `plan`. Each result is written at once, and not computed again.
 
@@ -104,7 +85,7 @@ def run_batch(
         try:
             run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
         except LightpaintError as error:
-            if not is_disk_full(error):
+            if not item_execution.is_disk_full(error):
                 raise
             raise OutputError(error, ": ", MAKE_ROOM) from None
         return run.outcome
@@ -119,10 +100,10 @@ class _Run:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: plan_steps.Plan,
         options: RunOptions,
         listen: Listener,
-        on_step: Callable[[PlannedLook, ItemResult], None],
+        on_step: Callable[[plan_steps.PlannedLook, ItemResult], None],
     ) -> None:
         self.journal = Journal(
             plan.folder, "/".join(sorted(plan.chosen_names)) if options.shares_folder else ""
@@ -154,11 +135,15 @@ class _Run:
         self._listen("steps", 0, self._total, "steps")
         self._engine = self._start_engine(stack)
         answers = [step for step in remaining if step.task.kind == "answer"]
-        by_sums = [x for x in answers if x.task.is_by_sums and not has_basis(x.task, self._cache)]
+        by_sums = [
+            x
+            for x in answers
+            if x.task.is_by_sums and not task_bases.has_basis(x.task, self._cache)
+        ]
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
             self._solve_by_sums([step for step in by_sums if step.task.bases == keys])
-        for group in by_bases(answers, self._looks):
+        for group in plan_steps.by_bases(answers, self._looks):
             self._run_with_bases(group)
         self._cache.keep_only(())
         for kind in ("render", "export"):
@@ -180,7 +165,7 @@ class _Run:
             return stack.enter_context(processes)
         return self._engine
 
-    def _solve_by_sums(self, steps: Sequence[PlanStep]) -> None:
+    def _solve_by_sums(self, steps: Sequence[plan_steps.PlanStep]) -> None:
         """Solve looks that share a basis which is never stored."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
         tasks = [step.task for step in by_look.values()]
@@ -191,7 +176,7 @@ class _Run:
                 raise OutputError(result.failure, ": ", MAKE_ROOM)
             self._record(by_look[result.look], result)
 
-    def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
+    def _run_with_bases(self, steps: Sequence[plan_steps.PlanStep]) -> None:
         """Run looks that share their bases; those combined from others come after them."""
         task = steps[0].task
         self._cache.keep_only(task.bases)
@@ -203,19 +188,19 @@ class _Run:
                     write_task_planes(self._plan.folder, task, bases, self._cache)
                 if self._engine.is_apart:
                     # Workers read the bases that this process rendered and no longer needs.
-                    files = save_bases(bases, stack) if bases else files
-                    former_look_files = save_former_looks(bases, stack)
+                    files = task_bases.save_bases(bases, stack) if bases else files
+                    former_look_files = task_bases.save_former_looks(bases, stack)
                     self._cache.keep_only(())
             except (LightpaintError, MemoryError) as error:
-                if is_disk_full(error):
+                if item_execution.is_disk_full(error):
                     raise
-                reason: str = OUT_OF_MEMORY_TEXT
+                reason: str = item_execution.OUT_OF_MEMORY_TEXT
                 if isinstance(error, LightpaintError):
                     reason = error.sentence.spelled(as_key)
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, reason)
                 return
-            for wave in waves(steps, self._looks):
+            for wave in plan_steps.waves(steps, self._looks):
                 file_fields: dict[str, Any] = {
                     "files": files,
                     "former_look_files": former_look_files,
@@ -232,12 +217,12 @@ class _Run:
         arguments = self._engine, self._cache, self._listen
         group = self._plan.group_of(task)
         return (
-            obtain_bases(task, *arguments)
+            task_bases.obtain_bases(task, *arguments)
             if group is None
-            else obtain_placed_bases(task, group, *arguments)
+            else task_bases.obtain_placed_bases(task, group, *arguments)
         )
 
-    def _run_steps(self, steps: Sequence[PlanStep]) -> None:
+    def _run_steps(self, steps: Sequence[plan_steps.PlanStep]) -> None:
         """Run steps that do not depend on each other, and retry failed ones as often as allowed."""
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
@@ -261,7 +246,9 @@ class _Run:
         """Return the task with a rough estimate of its time on one thread."""
         settings = self._looks[task.look].entry.settings
         times = 2 * (1 + settings.refine + 4 * bool(settings.suggest))
-        return replace(task, expected_s=times * look_seconds(self._looks[task.look], self._plan))
+        return replace(
+            task, expected_s=times * plan_steps.look_seconds(self._looks[task.look], self._plan)
+        )
 
     def _results(self, tasks: Sequence[Task]) -> Iterator[ItemResult]:
         """Yield the results of tasks. If final renders are few, all workers share each of them."""
@@ -273,11 +260,13 @@ class _Run:
             yield from self._engine.run(tasks)
             return
         for task in tasks:
-            variant = job_fields(task, self._cache)["scenes"][0].variant
+            variant = item_execution.job_fields(task, self._cache)["scenes"][0].variant
             by_all = distributed_renderer(self._engine, task, variant, self._listen)
-            yield attempt(task, partial(final_render, task, self._cache, self._listen, by_all))
+            yield item_execution.attempt(
+                task, partial(item_execution.final_render, task, self._cache, self._listen, by_all)
+            )
 
-    def _can_begin(self, step: PlanStep) -> bool:
+    def _can_begin(self, step: plan_steps.PlanStep) -> bool:
         """Return False if the look, or a look that it combines, has failed."""
         look = self._looks[step.task.look]
         failed_parts = [name for name in look.entry.combined_looks if name in self.outcome.failed]
@@ -290,7 +279,7 @@ class _Run:
         self._try_counts[key] = self._try_counts.get(key, 0) + 1
         return self._try_counts[key] <= self._options.retry
 
-    def _record(self, step: PlanStep, result: ItemResult) -> None:
+    def _record(self, step: plan_steps.PlanStep, result: ItemResult) -> None:
         """Record the result of a step, and report it."""
         look, seconds = self._looks[result.look], self.outcome.spent_s
         seconds[result.look] = seconds.get(result.look, 0.0) + result.spent_s
@@ -306,7 +295,11 @@ class _Run:
         self._listen("steps", self._finished_count, self._total, "steps")
 
     def _fail(
-        self, look: PlannedLook, step: PlanStep, reason: str, result: ItemResult | None = None
+        self,
+        look: plan_steps.PlannedLook,
+        step: plan_steps.PlanStep,
+        reason: str,
+        result: ItemResult | None = None,
     ) -> None:
         if self._engine.is_gone:
             raise BatchError(reason)

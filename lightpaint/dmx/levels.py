@@ -21,14 +21,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour import REC709, cct_and_duv, rgb_to_xyz
 from lightpaint.display_text import some_names
-from lightpaint.dmx.console_rig import (
-    ConsoleRig,
-    DmxChannel,
-    RigFixture,
-    RigLight,
-    RigWheel,
-    filter_drive,
-)
+from lightpaint.dmx import console_rig
 from lightpaint.errors import RigError
 from lightpaint.lighting import Lighting, LightSetting
 
@@ -56,7 +49,9 @@ def can_invert(densities: Sequence[Sequence[float]]) -> bool:
     return float(np.linalg.cond(np.array(densities, float))) <= MAX_CONDITION
 
 
-def filters_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, list[float]]:
+def filters_for_drives(
+    light: console_rig.RigLight, drives: Sequence[float]
+) -> tuple[float, list[float]]:
     """Return the dimmer, and how far in each filter is, 0 to 1, for drives of red, green and blue.
 
     Densities add: −log d = A t + δ, where a column of A is the density of a filter, t how far it
@@ -77,16 +72,20 @@ def filters_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float,
     return float(np.exp(-dimmed)), np.clip(places - dimmed * slope, 0, 1).tolist()
 
 
-def drives_of_filters(light: RigLight, dimmer: float, places: Sequence[float]) -> list[float]:
+def drives_of_filters(
+    light: console_rig.RigLight, dimmer: float, places: Sequence[float]
+) -> list[float]:
     """Return the drives of red, green and blue behind filters that are so far in."""
     return [float(x) for x in dimmer * np.exp(-_densities(light) @ np.array(places))]
 
 
-def _densities(light: RigLight) -> Doubles:
+def _densities(light: console_rig.RigLight) -> Doubles:
     return np.array([x.density for x in light.filters], float).T
 
 
-def xy_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, list[float]]:
+def xy_for_drives(
+    light: console_rig.RigLight, drives: Sequence[float]
+) -> tuple[float, list[float]]:
     """Return the luminance relative to full, and x and y, for drives of red, green and blue.
 
     Dark light keeps the x and y of all its emitters.
@@ -97,7 +96,7 @@ def xy_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, list
     return level, (xyz[:2] / xyz.sum()).tolist()
 
 
-def drives_of_xy(light: RigLight, level: float, xy: Sequence[float]) -> list[float]:
+def drives_of_xy(light: console_rig.RigLight, level: float, xy: Sequence[float]) -> list[float]:
     """Return the drives of red, green and blue for a luminance relative to full, and x and y.
 
     Colours outside Rec.709 are clipped.
@@ -109,7 +108,7 @@ def drives_of_xy(light: RigLight, level: float, xy: Sequence[float]) -> list[flo
     return [float(d) for d in np.clip(np.linalg.solve(columns, xyz), 0.0, 1.0)]
 
 
-def white_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, float]:
+def white_for_drives(light: console_rig.RigLight, drives: Sequence[float]) -> tuple[float, float]:
     """Return the dimmer and the colour temperature in kelvin for drives of both whites.
 
     Two whites mix a colour on the line between them, which is a little more purple than the black
@@ -121,7 +120,7 @@ def white_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, f
     return min(level, 1.0), float(np.interp(drives[1] / level, shares, kelvins))
 
 
-def drives_of_white(light: RigLight, level: float, kelvin: float) -> list[float]:
+def drives_of_white(light: console_rig.RigLight, level: float, kelvin: float) -> list[float]:
     """Return the drives of both whites for a dimmer and a colour temperature."""
     shares, kelvins = _whites(light)
     share = float(np.interp(kelvin, kelvins[::-1], shares[::-1]))
@@ -129,7 +128,7 @@ def drives_of_white(light: RigLight, level: float, kelvin: float) -> list[float]
 
 
 @lru_cache(256)
-def _whites(light: RigLight) -> tuple[Doubles, Doubles]:
+def _whites(light: console_rig.RigLight) -> tuple[Doubles, Doubles]:
     """Return shares of the warmer white, rising, and kelvin of their mixes, falling, (k,)."""
     shares, (cool, warm) = np.linspace(0.0, 1.0, WHITE_STEPS), _tristimulus(light).T
     mixes = cool + shares[:, None] * (warm - cool)
@@ -139,7 +138,7 @@ def _whites(light: RigLight) -> tuple[Doubles, Doubles]:
     return shares, np.minimum.accumulate(kelvins)
 
 
-def _tristimulus(light: RigLight) -> Doubles:
+def _tristimulus(light: console_rig.RigLight) -> Doubles:
     """Return X, Y and Z of each emitter at full, (3, e), relative to one candela."""
     columns = []
     for emitter in light.emitters:
@@ -148,7 +147,7 @@ def _tristimulus(light: RigLight) -> Doubles:
     return np.array(columns).T
 
 
-def encode_levels(rig: ConsoleRig, drives: Mapping[str, Drives]) -> dict[int, bytes]:
+def encode_levels(rig: console_rig.ConsoleRig, drives: Mapping[str, Drives]) -> dict[int, bytes]:
     """Return the 512 bytes of each universe of a rig.
 
     drives: by name of light; a light without any, and each emitter without one, is at 0.
@@ -162,7 +161,9 @@ def encode_levels(rig: ConsoleRig, drives: Mapping[str, Drives]) -> dict[int, by
     return {universe: bytes(levels) for universe, levels in universes.items()}
 
 
-def decode_levels(rig: ConsoleRig, universes: Mapping[int, bytes]) -> dict[str, dict[str, float]]:
+def decode_levels(
+    rig: console_rig.ConsoleRig, universes: Mapping[int, bytes]
+) -> dict[str, dict[str, float]]:
     """Return the drives of each light, by its name and the names of its emitters, that levels mean.
 
     universes: 512 bytes each; one that is missing is all at 0.
@@ -174,14 +175,18 @@ def decode_levels(rig: ConsoleRig, universes: Mapping[int, bytes]) -> dict[str, 
     }
 
 
-def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
+def _levels_of(
+    fixture: console_rig.RigFixture, light: console_rig.RigLight, drives: Drives
+) -> dict[int, int]:
     """Return the levels of the channels of a light, by their places among the fixture's."""
     if not light.is_controlled:
         return {}
     return _mixing_levels(fixture, light, drives) | _filter_levels(fixture, light, drives)
 
 
-def _filter_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
+def _filter_levels(
+    fixture: console_rig.RigFixture, light: console_rig.RigLight, drives: Drives
+) -> dict[int, int]:
     """Return the levels of colour wheels in front of what a light mixes: at the slots whose drive
     is largest, or open.
     """
@@ -198,7 +203,9 @@ def _filter_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict
     }
 
 
-def _mixing_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
+def _mixing_levels(
+    fixture: console_rig.RigFixture, light: console_rig.RigLight, drives: Drives
+) -> dict[int, int]:
     """Return the levels of dimmers, and of what mixes or chooses the colour."""
     channels = fixture.channels
     levels = {k: _level(1.0, channels[k]) for k in (*light.dimmers[1:], *light.masters)}
@@ -235,7 +242,7 @@ def _mixing_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict
 
 
 def _drives_of(
-    fixture: RigFixture, light: RigLight, universes: Mapping[int, bytes]
+    fixture: console_rig.RigFixture, light: console_rig.RigLight, universes: Mapping[int, bytes]
 ) -> dict[str, float]:
     channels = fixture.channels
 
@@ -268,7 +275,7 @@ def _drives_of(
 
 
 def _shown_slots(
-    fixture: RigFixture, wheel: RigWheel, universes: Mapping[int, bytes]
+    fixture: console_rig.RigFixture, wheel: console_rig.RigWheel, universes: Mapping[int, bytes]
 ) -> list[bool]:
     """Return which combination of slots the levels of wheels mean; none while one is between."""
     levels = [_read(universes, fixture, fixture.channels[k]) for k in wheel.channels]
@@ -282,12 +289,12 @@ def _shown_slots(
 _Curve = Sequence[tuple[float, float]]
 
 
-def _level(share: float, channel: DmxChannel) -> int:
+def _level(share: float, channel: console_rig.DmxChannel) -> int:
     """Return the level at which a channel gives a share of what it controls."""
     return round(min(max(_inverse(channel.curve, share), 0.0), 1.0) * channel.highest)
 
 
-def _level_of_at_least(share: float, channel: DmxChannel) -> int:
+def _level_of_at_least(share: float, channel: console_rig.DmxChannel) -> int:
     """Return the level at which a channel gives a share of what it controls, or little more."""
     level = _level(share, channel)
     enough = [
@@ -298,7 +305,7 @@ def _level_of_at_least(share: float, channel: DmxChannel) -> int:
     return min(enough, key=lambda x: _share(x, channel), default=level)
 
 
-def _share(level: int, channel: DmxChannel) -> float:
+def _share(level: int, channel: console_rig.DmxChannel) -> float:
     """Return the share of what a channel controls that a level gives."""
     return _forward(channel.curve, level / channel.highest)
 
@@ -318,7 +325,9 @@ def _forward(curve: _Curve, level: float) -> float:
     return float(np.interp(level, levels, shares))
 
 
-def _read(universes: Mapping[int, bytes], fixture: RigFixture, channel: DmxChannel) -> int:
+def _read(
+    universes: Mapping[int, bytes], fixture: console_rig.RigFixture, channel: console_rig.DmxChannel
+) -> int:
     values = [
         universes[universe][index] if universe in universes else 0
         for universe, index in fixture.places(channel)
@@ -339,10 +348,10 @@ def drives_of(lighting: Lighting) -> dict[str, Drives]:
 
 def _wheel_drive(light: LightSetting) -> Drives:
     behind = "" if light.lamp is None else light.lamp.behind
-    return {filter_drive(behind): 1.0} if behind else {}
+    return {console_rig.filter_drive(behind): 1.0} if behind else {}
 
 
-def check_drives(rig: ConsoleRig, drives: RigDrives) -> None:
+def check_drives(rig: console_rig.ConsoleRig, drives: RigDrives) -> None:
     """Raise RigError for a light or an emitter that a rig lacks, and for a drive beyond 0 and 1."""
     emitters = {
         light.name: {
@@ -368,7 +377,7 @@ def check_drives(rig: ConsoleRig, drives: RigDrives) -> None:
                 raise RigError(f"{emitter!r} of {light!r} has the drive {drive:g}: expected 0 to 1")
 
 
-def check_lamps(rig: ConsoleRig, lamps: Mapping[str, Collection[str]]) -> None:
+def check_lamps(rig: console_rig.ConsoleRig, lamps: Mapping[str, Collection[str]]) -> None:
     """Raise RigError for lamps, the names of their emitters by light, that a rig lacks, and if
     there are none.
     """

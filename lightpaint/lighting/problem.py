@@ -28,17 +28,9 @@ from lightpaint.lighting.linear_problem import (
     reduce_lights,
     whites_for,
 )
+from lightpaint.lighting.loss import painting
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.painting import (
-    at_least_mask,
-    choose_loss,
-    joint_squares,
-    resolve_emitter_paint,
-    resolve_importance,
-    target_light,
-    unpainted_weight_of,
-)
 from lightpaint.lighting.loss.pixel_loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
@@ -202,12 +194,12 @@ class Problem(LinearProblem):
         all_constraints = with_scale(all_constraints, bases[0].lights)
         whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
-        squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
-        loss = choose_loss(
+        squares = painting.joint_squares(views, unpainted=painting.unpainted_weight_of(views, fit))
+        loss = painting.choose_loss(
             squares,
-            at_least_mask(views),
+            painting.at_least_mask(views),
             fit.transform,
-            painted=lambda: target_light(views),
+            painted=lambda: painting.target_light(views),
             current=lambda: whole.current_look,
         )
         reference = start_weights(all_constraints.start, whole.lights)
@@ -337,14 +329,14 @@ def _resolve_views(
             f"{len(targets)} targets for bases of {len(bases)} views: give one for each"
         )
     fitted = [
-        resolve_importance(
+        painting.resolve_importance(
             target.fitted_to(basis.size, resize=resize), basis.emitters_seen, fit.emitters
         )
         for target, basis in zip(targets, bases, strict=True)
     ]
     fit = resolve_for_targets(fit, fitted)
     resolved = (
-        resolve_emitter_paint(target, basis, fit)
+        painting.resolve_emitter_paint(target, basis, fit)
         for target, basis in zip(fitted, bases, strict=True)
     )
     return Views(bases, tuple(resolved)), fit
@@ -388,7 +380,7 @@ class ViewsReading(PaintReading):
     def amounts(self) -> tuple[float, float]:
         """Return the importance of all pixels together, and the weight of each unpainted one."""
         importance = sum(float(x.importance.sum(dtype=np.float64)) for x in self._views.targets)
-        return importance, unpainted_weight_of(self._views, self.fit)
+        return importance, painting.unpainted_weight_of(self._views, self.fit)
 
 
 def wash_of(views: Views) -> Wash:

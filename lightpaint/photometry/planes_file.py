@@ -16,15 +16,8 @@ from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import SceneError
 from lightpaint.files import is_name, one_line, read_text
 from lightpaint.keywords import keywords
+from lightpaint.photometry import illuminance
 from lightpaint.photometry.glare import GlareObserver
-from lightpaint.photometry.illuminance import (
-    PRESETS,
-    LightCase,
-    MeasuringPlane,
-    PowerBudget,
-    Ratio,
-    Wishes,
-)
 from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
 from lightpaint.photometry.room_rays import CAMERA, ObserverRequest, RoomRays, place_observers
@@ -66,9 +59,9 @@ class PlanesFile:
     """
 
     path: Path
-    planes: tuple[MeasuringPlane, ...]
-    power: PowerBudget = field(default_factory=PowerBudget)
-    cases: tuple[LightCase, ...] = ()
+    planes: tuple[illuminance.MeasuringPlane, ...]
+    power: illuminance.PowerBudget = field(default_factory=illuminance.PowerBudget)
+    cases: tuple[illuminance.LightCase, ...] = ()
     observers: tuple[GlareObserver, ...] = ()
     error: float = DEFAULT_ERROR
 
@@ -138,8 +131,8 @@ class _Content(NamedTuple):
     """The content of a planes file before it is placed in a scene."""
 
     planes: list[PlaneRequest]
-    power: PowerBudget
-    cases: tuple[LightCase, ...]
+    power: illuminance.PowerBudget
+    cases: tuple[illuminance.LightCase, ...]
     observers: tuple[ObserverRequest, ...]
     error: float
 
@@ -284,18 +277,20 @@ def _number(
 
 def _wishes(
     name: str, table: Mapping[str, Any], where: SourceKey, planes: Mapping[str, Any]
-) -> Wishes:
+) -> illuminance.Wishes:
     """Return the wishes of a plane; its own figures replace the figures of its preset."""
     preset = table.get("preset", "")
-    if not isinstance(preset, str) or (preset and preset not in PRESETS):
-        listing = with_similar_name(f"there are {', '.join(PRESETS)}", str(preset), [*PRESETS])
+    if not isinstance(preset, str) or (preset and preset not in illuminance.PRESETS):
+        listing = with_similar_name(
+            f"there are {', '.join(illuminance.PRESETS)}", str(preset), [*illuminance.PRESETS]
+        )
         raise SceneError(f"{where / 'preset'} is {one_line(repr(preset))}: {listing}")
     mean = _number(table, "mean", where, 0, MOST_LUX)
     uniformity = _number(table, "uniformity", where, 0, 1)
     most = _number(table, "max", where, 0, MOST_LUX)
     if preset:
-        mean = PRESETS[preset].mean if mean is None else mean
-        uniformity = PRESETS[preset].uniformity if uniformity is None else uniformity
+        mean = illuminance.PRESETS[preset].mean if mean is None else mean
+        uniformity = illuminance.PRESETS[preset].uniformity if uniformity is None else uniformity
     if mean is not None and most is not None and mean > most:
         raise SceneError(f"{where} wishes for a mean of {mean:g} lx and at most {most:g} lx")
     ratios = table.get("ratio", [])
@@ -304,13 +299,13 @@ def _wishes(
     if not isinstance(ratios, list):
         raise SceneError(f"{where / 'ratio'} is {one_line(repr(ratios))}: expected {RATIO_EXAMPLE}")
     own = tuple(_ratio(name, x, where / "ratio", planes) for x in ratios)
-    return Wishes(mean, uniformity, most, own, preset)
+    return illuminance.Wishes(mean, uniformity, most, own, preset)
 
 
 RATIO_EXAMPLE = '{ to = "desk", at_least = 0.33 }'
 
 
-def _ratio(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -> Ratio:
+def _ratio(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -> illuminance.Ratio:
     """Return the wish for the ratio of a plane's mean to another's."""
     _check_known(table, ("to", "at_least"), where, RATIO_EXAMPLE)
     to, at_least = table.get("to"), _number(table, "at_least", where, 0, 1e6)
@@ -321,10 +316,10 @@ def _ratio(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -
         known = f"the file has {some_names(others)}" if others else "the file has no other"
         listing = with_similar_name(known, to, others)
         raise SceneError(f"{where / 'to'} is no other plane, {one_line(repr(to))}: {listing}")
-    return Ratio(to, at_least)
+    return illuminance.Ratio(to, at_least)
 
 
-def _cases(tables: Any, where: SourceKey) -> tuple[LightCase, ...]:
+def _cases(tables: Any, where: SourceKey) -> tuple[illuminance.LightCase, ...]:
     """Return the cases in which all wishes have to hold."""
     example = "[case.night] sky = 0"
     if not isinstance(tables, dict) or len(tables) > MAX_CASES:
@@ -344,7 +339,7 @@ def _cases(tables: Any, where: SourceKey) -> tuple[LightCase, ...]:
             light: _number(table, light, where / one_line(name), 0, MOST_FACTOR, may_be_least=True)
             for light in table
         }
-        cases.append(LightCase(name, {light: x or 0.0 for light, x in factors.items()}))
+        cases.append(illuminance.LightCase(name, {light: x or 0.0 for light, x in factors.items()}))
     return tuple(cases)
 
 
@@ -380,12 +375,12 @@ def _observers(tables: Any, where: SourceKey) -> tuple[ObserverRequest, ...]:
 OBSERVER_EXAMPLE = "at = [1, 1.2, 0], towards = [4, 1.2, 0]"
 
 
-def _power(table: Any, where: SourceKey) -> PowerBudget:
+def _power(table: Any, where: SourceKey) -> illuminance.PowerBudget:
     """Return the limit of power."""
     _check_known(table, ("watts", "per_area", "area"), where, "watts = 300")
     if {"watts", "per_area"} <= set(table):
         raise SceneError(f"{where} has watts and per_area: expected one of them")
-    return PowerBudget(
+    return illuminance.PowerBudget(
         _number(table, "watts", where, 0, MOST_WATTS),
         _number(table, "per_area", where, 0, MOST_WATTS),
         _number(table, "area", where, 0, MOST_METRES**2),

@@ -17,15 +17,8 @@ from lightpaint.arrays import Doubles
 from lightpaint.display_text import visible
 from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats import png_bytes
+from lightpaint.photometry import illuminance
 from lightpaint.photometry.glare import Glare, GlareReading
-from lightpaint.photometry.illuminance import (
-    PRESETS,
-    Illuminance,
-    MeasuringPlane,
-    PlaneReading,
-    Wishes,
-    relative_intervals,
-)
 from lightpaint.storage.json_records import strict_json
 
 FORMAT = "lightpaint-illuminance 1"
@@ -68,7 +61,7 @@ def readings_files(planes: Iterable[str]) -> list[str]:
 
 def write_readings(
     folder: Path,
-    measured: Illuminance,
+    measured: illuminance.Illuminance,
     weights: Doubles,
     origin: str,
     *,
@@ -87,7 +80,7 @@ def write_readings(
         write_bytes(folder / (plane.name + PICTURE_SUFFIX), png_bytes(image))
 
 
-def points_text(measured: Illuminance, weights: Doubles) -> str:
+def points_text(measured: illuminance.Illuminance, weights: Doubles) -> str:
     """Return the illuminance at all points as CSV, in lx with standard errors."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -102,7 +95,7 @@ def points_text(measured: Illuminance, weights: Doubles) -> str:
 
 
 def readings_document(
-    measured: Illuminance, weights: Doubles, *, glare: Glare | None = None
+    measured: illuminance.Illuminance, weights: Doubles, *, glare: Glare | None = None
 ) -> dict[str, Any]:
     """Return the readings of all planes and observers for programs (docs/photometry.md)."""
     observers = {} if glare is None else glare.readings(weights)
@@ -128,7 +121,7 @@ def glare_document(reading: GlareReading) -> dict[str, Any]:
 
 
 def _plane_document(
-    plane: MeasuringPlane, measured: Illuminance, weights: Doubles
+    plane: illuminance.MeasuringPlane, measured: illuminance.Illuminance, weights: Doubles
 ) -> dict[str, Any]:
     """Return the reading of a plane, what was wished for, and the mean that each light gives."""
     by_light = np.einsum("pnc,nc->n", measured.matrix[measured.points_of(plane.name)], weights)
@@ -143,15 +136,15 @@ def _plane_document(
     }
 
 
-def wishes_document(wishes: Wishes) -> dict[str, Any]:
+def wishes_document(wishes: illuminance.Wishes) -> dict[str, Any]:
     """Return wishes for programs, without what is not wished for."""
     document = {key: value for key, value in asdict(wishes).items() if value}
     if wishes.preset:
-        document["preset_from"] = str(PRESETS[wishes.preset])
+        document["preset_from"] = str(illuminance.PRESETS[wishes.preset])
     return document
 
 
-def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
+def missed_wishes(measured: illuminance.Illuminance, weights: Doubles) -> list[str]:
     """Return a sentence for each wish that is not met at the sure end of its 95 % interval, and for
     each plane that no lamp reaches.
     """
@@ -177,12 +170,15 @@ def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
 
 
 def _missed_by_points(
-    measured: Illuminance, plane: MeasuringPlane, reading: PlaneReading, weights: Doubles
+    measured: illuminance.Illuminance,
+    plane: illuminance.MeasuringPlane,
+    reading: illuminance.PlaneReading,
+    weights: Doubles,
 ) -> Iterator[str]:
     """Yield a sentence for a uniformity and a limit that are missed."""
     part, wishes = measured.points_of(plane.name), plane.wishes
     values, errors = measured.of(weights)[part], measured.standard_errors(weights)[part]
-    relative = relative_intervals(values, errors)
+    relative = illuminance.relative_intervals(values, errors)
     least = float((values * (1 - relative)).min()) / reading.mean if reading.mean > 0 else 0.0
     if wishes.uniformity is not None and least < wishes.uniformity * (1 - CLOSE):
         sure = _sure(reading.uniformity, least, wishes.uniformity, is_share=True)
@@ -240,7 +236,9 @@ def isolux_levels(most: float) -> list[float]:
     return [step * k for k in range(math.ceil(most / step - 1e-9) + 1)]
 
 
-def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDArray[np.uint8]:
+def false_colours(
+    plane: illuminance.MeasuringPlane, values: Doubles, title: str
+) -> npt.NDArray[np.uint8]:
     """Return a picture of the illuminance on a plane, (h, w, 3).
 
     values: (p,), lx at its points. Between points the light is interpolated; cells without a point
@@ -264,7 +262,7 @@ def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDA
     return np.asarray(sheet)
 
 
-def lengths_text(plane: MeasuringPlane) -> str:
+def lengths_text(plane: illuminance.MeasuringPlane) -> str:
     """Return the mean lengths of a plane's grid in metres, across and along, after a comma.
 
     "" for listed points, a single row, and surfaces that lie beside each other in the picture.

@@ -28,25 +28,12 @@ from lightpaint.lighting import (
     tie_frames,
     with_findings,
 )
+from lightpaint.pipeline import job_bases
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.solve_job import Job, PaintedView
-from lightpaint.pipeline.job_bases import (
-    add_needed_samples,
-    obtain_bases_of,
-    problem_of,
-    view_listener,
-    without_noise,
-)
 from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
+from lightpaint.pipeline.results import result_folder
 from lightpaint.pipeline.results.look import Look, write_predicted, write_report
-from lightpaint.pipeline.results.result_folder import (
-    LIGHTING,
-    AnswerFolder,
-    new_answer,
-    reload_relit,
-    with_places,
-    write_planes,
-)
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     answer_on_planes,
@@ -100,17 +87,21 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job.results.check()
     for remark in job.remarks:
         listen.say(remark)
-    job, obtained, placement = place_lights(job, obtain_bases_of(job, bases, listen), listen)
+    job, obtained, placement = place_lights(
+        job, job_bases.obtain_bases_of(job, bases, listen), listen
+    )
     job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
-        obtained = add_needed_samples(job, obtained, listen)
+        obtained = job_bases.add_needed_samples(job, obtained, listen)
     planes = planes_of_job(job, obtained[0].lights, listen)
     found = answer_job(job, obtained, listen, placement=placement, planes=planes)
     rig = _suggest(job, found, placement, listen)
     lighting, scene = found.lighting, job.views[0].scene
-    with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
+    with result_folder.new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))
+            _finish_view(
+                job, answer, view, analysis, rig, job_bases.view_listener(job, view, listen)
+            )
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
@@ -158,7 +149,7 @@ def answer_job(
     if job.settings.animate:
         return _animated_answer(job, bases, listen)
     with stage("solving", listen, SOLVE_ADVICE):
-        problem = problem_of(job, bases)
+        problem = job_bases.problem_of(job, bases)
         bases.clear()
         required = None if planes is None else require(problem, planes, job.settings, listen)
         problem = problem if required is None else required.problem
@@ -192,8 +183,8 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
         f"{max(certificate.kkt_residual):.1e}"
     )
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
-        solution = without_noise(job, solution)
-    held = hold_to_current(solution, partial(without_noise, job))
+        solution = job_bases.without_noise(job, solution)
+    held = hold_to_current(solution, partial(job_bases.without_noise, job))
     if held is not solution:
         listen.say(
             Sentence(
@@ -209,7 +200,7 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
         scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
     )
     solution = choose_mixes(solution)
-    lighting = with_places(solution.lighting, job.views[0].scene)
+    lighting = result_folder.with_places(solution.lighting, job.views[0].scene)
     return replace(solution, lighting=lighting)
 
 
@@ -245,13 +236,13 @@ def _with_keys(
 def _reloaded(look: Look) -> Look:
     """Return `look` with its relit scene read again from disk."""
     assert look.relit is not None
-    relit = reload_relit(look.relit, look.relit.path, look.relit.sensor)
+    relit = result_folder.reload_relit(look.relit, look.relit.path, look.relit.sensor)
     return replace(look, relit=relit)
 
 
 def _finish_view(
     job: Job,
-    answer: AnswerFolder,
+    answer: result_folder.AnswerFolder,
     view: PaintedView,
     analysis: Analysis,
     rig: _RigFindings,
@@ -272,9 +263,14 @@ def _finish_view(
         if view is job.views[0]:
             _remark_on_parameters(relit, listen)
             if rig.planes is not None and settings.planes is not None:
-                origin, measured = f"{scene.path.name} lit by {LIGHTING}", rig.planes.wished
+                origin, measured = (
+                    f"{scene.path.name} lit by {result_folder.LIGHTING}",
+                    rig.planes.wished,
+                )
                 lit, glare = rig.planes.weights_by_case, rig.planes.glare
-                write_planes(answer.path, measured.illuminance, lit, origin, glare=glare)
+                result_folder.write_planes(
+                    answer.path, measured.illuminance, lit, origin, glare=glare
+                )
     _write_prediction(folder, predicted, basis, budget, relit)
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)

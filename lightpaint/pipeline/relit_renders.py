@@ -13,41 +13,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint import images
 from lightpaint.arrays import Floats
 from lightpaint.basis import LightGroups, parse_frames, read_light_groups
 from lightpaint.basis.render import emitters_seen
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.errors import BasisError, ImageError, OutputError
 from lightpaint.files import check_files
-from lightpaint.images import (
-    HALF_DIFFERENCE,
-    Estimate,
-    Features,
-    denoised,
-    denoiser_text,
-    write_estimate,
-)
-from lightpaint.images.formats import (
-    ExrPart,
-    read_headers,
-    rgb_channels,
-    write_parts,
-    write_png,
-    write_png_16,
-)
+from lightpaint.images import formats
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.pipeline.job.job_checks import remarks_of_pictures
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
-from lightpaint.pipeline.results.result_folder import (
-    LIGHTING,
-    RELIT,
-    ResultFolder,
-    answer_files,
-    new_answer,
-    reload_relit,
-)
+from lightpaint.pipeline.results import result_folder
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.relit import relight, relit_part
 from lightpaint.scene import Scene, Stream, render, render_features, with_width
@@ -69,15 +48,15 @@ def relit_folder(
     *,
     views: Sequence[str] = ("",),
     force: bool = False,
-) -> ResultFolder:
+) -> result_folder.ResultFolder:
     """Return the folder that `relight_look` writes to.
 
     lighting: the file of the lighting. views: as in `relight_look`.
     """
-    files = answer_files(folder, scene=scene, has_lighting=True)
+    files = result_folder.answer_files(folder, scene=scene, has_lighting=True)
     files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
     input_files = (lighting, *scene.read_files)
-    return ResultFolder(
+    return result_folder.ResultFolder(
         folder, tuple(files), input_files, (lighting,), adds_to=lighting, force=force
     )
 
@@ -85,13 +64,13 @@ def relit_folder(
 def relight_look(
     scenes: Mapping[str, Scene],
     lighting: Lighting,
-    results: ResultFolder,
+    results: result_folder.ResultFolder,
     *,
     spp: int | None = None,
     seed: int = 0,
     resolution: str | None = None,
     progress: Progress = silent,
-    render_elsewhere: Callable[[Scene], Estimate] | None = None,
+    render_elsewhere: Callable[[Scene], images.Estimate] | None = None,
 ) -> None:
     """Write relit.xml, and its renders as relit.exr and, denoised, relit.png.
 
@@ -104,7 +83,7 @@ def relight_look(
     results.check()
     options: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
     first, *_ = scenes.values()
-    with new_answer(results, lighting, scene=first, has_lighting=True) as answer:
+    with result_folder.new_answer(results, lighting, scene=first, has_lighting=True) as answer:
         for view, scene in scenes.items():
             folder = answer.path
             relit = on_film(answer.seen_through(scene.sensor), None, resolution)
@@ -115,12 +94,12 @@ def relight_look(
                 else render(relit, spp=spp, label=label, **options)
             )
             (folder / view).mkdir(exist_ok=True)
-            write_estimate(folder / view / "relit.exr", image, {})
+            images.write_estimate(folder / view / "relit.exr", image, {})
             features = render_features(relit, seed=seed)
-            clean = denoised(image.image, features, quality="high")
-            texts = denoiser_text(features, raw="relit.exr")
+            clean = images.denoised(image.image, features, quality="high")
+            texts = images.denoiser_text(features, raw="relit.exr")
             stops = choose_exposure(clean, emitters_seen(relit))
-            write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
+            formats.write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
 
 
 @dataclass(frozen=True)
@@ -130,9 +109,9 @@ class FinalPicture:
     image: as rendered. clean: (h, w, 3) linear, denoised. features: what guided the denoiser.
     """
 
-    image: Estimate
+    image: images.Estimate
     clean: Floats
-    features: Features
+    features: images.Features
 
 
 def render_final(
@@ -150,28 +129,28 @@ def render_final(
     Raises LightpaintError if the lighting does not fit the scene.
     """
     with tempfile.TemporaryDirectory(prefix="lightpaint-") as place:
-        relit = relight(scene, lighting, Path(place) / RELIT)
+        relit = relight(scene, lighting, Path(place) / result_folder.RELIT)
         if relit.sensor != scene.sensor:
-            relit = reload_relit(relit, relit.path, scene.sensor)
+            relit = result_folder.reload_relit(relit, relit.path, scene.sensor)
         relit = replace(relit, film=with_width(relit.film, width))
         options: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION}
         image = render(relit, spp=spp, label="final", progress=progress, **options)
         features = render_features(relit, seed=seed)
-    return FinalPicture(image, denoised(image.image, features, quality="high"), features)
+    return FinalPicture(image, images.denoised(image.image, features, quality="high"), features)
 
 
 def write_final_exr(path: Path, picture: FinalPicture) -> None:
     """Write the light of a final render: as rendered, its noise, and denoised as a layer."""
-    channels = rgb_channels(picture.image.image)
-    channels |= rgb_channels(picture.image.half_difference, HALF_DIFFERENCE)
-    channels |= rgb_channels(picture.clean, DENOISED)
-    write_parts(path, [ExrPart("rgb", channels, {})])
+    channels = formats.rgb_channels(picture.image.image)
+    channels |= formats.rgb_channels(picture.image.half_difference, images.HALF_DIFFERENCE)
+    channels |= formats.rgb_channels(picture.clean, DENOISED)
+    formats.write_parts(path, [formats.ExrPart("rgb", channels, {})])
 
 
 def write_final_png(path: Path, picture: FinalPicture, transform: ViewTransform) -> None:
     """Write a final render, denoised, as a display shows it: 16 bits a channel."""
-    texts = texts_of(transform) | denoiser_text(picture.features, raw="render.exr")
-    write_png_16(path, transform.encode(picture.clean), texts=texts)
+    texts = texts_of(transform) | images.denoiser_text(picture.features, raw="render.exr")
+    formats.write_png_16(path, transform.encode(picture.clean), texts=texts)
 
 
 def frames_to_write(job: Job, text: str | None) -> tuple[int, ...]:
@@ -221,7 +200,7 @@ def relight_frames(
         >>> [file.name for file in lp.relight_frames(job)]
         ['relit.0001.exr', 'relit.0002.exr']
     """
-    listen, lighting = listener(progress), read_lighting(job.folder / LIGHTING)
+    listen, lighting = listener(progress), read_lighting(job.folder / result_folder.LIGHTING)
     frames = frames_to_write(job, frames) if isinstance(frames, str) else tuple(frames)
     pictures, sequence = _check_pictures(job, frames), job.sequence
     assert sequence is not None
@@ -236,7 +215,7 @@ def relight_frames(
     for done, frame in enumerate(missing):
         listen("frames", done, len(missing), "frames")
         part = relit_part(_groups_of(job, frame), lighting.at_frame(frame))
-        write_parts(pictures[frame], [replace(part, attributes={FRAME_KEY: marks[frame]})])
+        formats.write_parts(pictures[frame], [replace(part, attributes={FRAME_KEY: marks[frame]})])
         listen("frames", done + 1, len(missing), "frames")
     return [pictures[frame] for frame in frames]
 
@@ -293,6 +272,6 @@ def _mark(path: Path, lighting: Lighting) -> str:
 def _mark_in(file: Path) -> str:
     """Return the mark of a picture; "" if it has none."""
     try:
-        return read_headers(file)[0][0].get(FRAME_KEY, "")
+        return formats.read_headers(file)[0][0].get(FRAME_KEY, "")
     except (ImageError, OSError, IndexError):
         return ""

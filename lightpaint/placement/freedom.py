@@ -16,17 +16,9 @@ from lightpaint.arrays import Doubles, Floats, Position, as_position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
+from lightpaint.placement import permitted_places
 from lightpaint.placement.free_space import far_apart
 from lightpaint.placement.paths.panel_lights import PanelSite
-from lightpaint.placement.permitted_places import (
-    OVERSAMPLING,
-    BallOfPlaces,
-    BoxOfPlaces,
-    EitherPlaces,
-    OnePlace,
-    Places,
-    Rails,
-)
 from lightpaint.scene import FARTHEST
 from lightpaint.scene.properties.site import Site, across, rotation_between
 from lightpaint.validation import parse_number
@@ -214,7 +206,7 @@ class FreeLight:
     name: str
     site: Site
     freedom: Freedom
-    places: Places | None = None
+    places: permitted_places.Places | None = None
     sides: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -321,7 +313,7 @@ class FreeLight:
         if not self.freedom.slides or count < 2:
             return position
         assert self.places is not None
-        many = self.places.random(OVERSAMPLING * count, rng)
+        many = self.places.random(permitted_places.OVERSAMPLING * count, rng)
         return np.concatenate([position, far_apart(many, count - 1, start=position)])
 
     def directions(self, apart: float) -> Floats:
@@ -396,18 +388,22 @@ def _middles(low: float, high: float, count: int) -> Doubles:
     return np.asarray(edges[1::2])
 
 
-def places_of(freedom: Freedom, position: Doubles, surfaces: Places | None = None) -> Places:
+def places_of(
+    freedom: Freedom, position: Doubles, surfaces: permitted_places.Places | None = None
+) -> permitted_places.Places:
     """Return the places of a freedom. position: (3,), the current one. surfaces: of its shapes."""
-    parts: list[Places] = [] if surfaces is None else [surfaces]
+    parts: list[permitted_places.Places] = [] if surfaces is None else [surfaces]
     if freedom.all_rails:
-        parts.append(Rails(np.array(freedom.all_rails, dtype=float)))
+        parts.append(permitted_places.Rails(np.array(freedom.all_rails, dtype=float)))
     if parts:
-        return parts[0] if len(parts) == 1 else EitherPlaces(parts)
+        return parts[0] if len(parts) == 1 else permitted_places.EitherPlaces(parts)
     if freedom.box is not None:
-        return BoxOfPlaces(np.min(freedom.box, axis=0), np.max(freedom.box, axis=0))
+        return permitted_places.BoxOfPlaces(
+            np.min(freedom.box, axis=0), np.max(freedom.box, axis=0)
+        )
     if freedom.within is not None:
-        return BallOfPlaces(position, freedom.within)
-    return OnePlace(position)
+        return permitted_places.BallOfPlaces(position, freedom.within)
+    return permitted_places.OnePlace(position)
 
 
 def _turned(start: Position, direction: Position, degrees: float) -> Position:

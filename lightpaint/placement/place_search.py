@@ -15,30 +15,16 @@ from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Constraints, Solution
+from lightpaint.placement import lights_to_place
 from lightpaint.placement.free_space import pixels_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.light_changes import AddedLight, Move, Placement, hung
-from lightpaint.placement.lights_to_place import (
-    Arrangement,
-    Movable,
-    NewLight,
-    free_light,
-    movables_of,
-    new_lights_of,
-    new_movables_of,
-)
 from lightpaint.placement.look_goals import check_looks, check_views, films_of
 from lightpaint.placement.new_lights import MirroredPair, NewLights, RiggedLights
 from lightpaint.placement.paths.panel_lights import PanelSite, without_panels
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import fit_of
-from lightpaint.placement.search.judgement import (
-    ArrangementError,
-    Found,
-    Growth,
-    PlacementJudge,
-    PoseError,
-)
+from lightpaint.placement.search import judgement
 from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_search import TURNS, PoseRules, PoseSearch
 from lightpaint.placement.suggestion import Suggestion
@@ -145,8 +131,11 @@ def place_rigged(
     scene, view_bases = views[0][0], [basis for _, basis in views]
     looks = check_looks(solution, view_bases)
     for name, freedom in rigged.freedoms.items():
-        free_light(scene, name, freedom)
-    lights, names = new_lights_of(scene, rigged.new), [light.name for light in view_bases[0].lights]
+        lights_to_place.free_light(scene, name, freedom)
+    lights, names = (
+        lights_to_place.new_lights_of(scene, rigged.new),
+        [light.name for light in view_bases[0].lights],
+    )
     # Only paths are traced in these: a panel that moves must not hide where it hung.
     small, large = ([without_panels(x, rigged.moving) for x in films] for films in films_of(views))
 
@@ -154,8 +143,8 @@ def place_rigged(
         paths = SearchPaths(small, large, loaded, seed=seed)
         if not len(paths.space.points):
             raise NoPlaceError(f"the camera of {scene.path} sees nothing that light falls on")
-        movables = movables_of(scene, names, rigged, paths, seed=seed)
-        slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
+        movables = lights_to_place.movables_of(scene, names, rigged, paths, seed=seed)
+        slots = lights_to_place.new_movables_of(scene, lights, len(names), paths, seed=seed)
         with_panels = any(isinstance(x.light.site, PanelSite) for x in (*movables, *slots))
         coarse, fine = (
             fit_of(
@@ -174,7 +163,7 @@ def place_rigged(
             poses.steps.watch = lambda arrangement: watch(_sites_by_name(arrangement, names))
         if is_enough is not None:
             poses.steps.is_enough = is_enough
-        judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
+        judge = judgement.PlacementJudge(fine, poses.steps.with_fit(fine), paths)
         stages = _Stages(progress, TURNS * len(movables), STARTS * len(slots), STEPS)
         start, best = _searched(poses, judge, movables, slots, stages)
         judge = judge.without_noise(best)
@@ -197,18 +186,18 @@ class _Result:
     best lighting with none, one … of the new lights, largest gain first.
     """
 
-    found: Found
-    errors: ArrangementError
+    found: judgement.Found
+    errors: judgement.ArrangementError
     seen: Sequence[tuple[float, float] | None]
-    growth: list[Growth]
+    growth: list[judgement.Growth]
     spread: float
     size: tuple[int, int]
 
     @classmethod
     def of(
         cls,
-        found: Found,
-        judge: PlacementJudge,
+        found: judgement.Found,
+        judge: judgement.PlacementJudge,
         paths: SearchPaths,
         view: Scene,
         *,
@@ -225,7 +214,9 @@ class _Result:
         errors = (
             judge.errors(found.arrangement)
             if is_changed and with_errors
-            else ArrangementError([PoseError(None, None)] * len(sites), np.zeros((0, 3)))
+            else judgement.ArrangementError(
+                [judgement.PoseError(None, None)] * len(sites), np.zeros((0, 3))
+            )
         )
         return cls(
             found,
@@ -289,7 +280,9 @@ class _Stages:
             self._progress("poses", done, self._total)
 
 
-def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, Site]:
+def _sites_by_name(
+    arrangement: lights_to_place.Arrangement, names: Sequence[str]
+) -> dict[str, Site]:
     """Return the pose of each light of movables, by name. names: of the lights of the scene."""
     sites = {}
     for movable, site in zip(arrangement.movables, arrangement.sites, strict=True):
@@ -299,7 +292,7 @@ def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, 
     return sites
 
 
-def _additions(found: Found) -> list[int]:
+def _additions(found: judgement.Found) -> list[int]:
     """Return the indices of the new lights among the movables, largest gain first."""
     new = [k for k, movable in enumerate(found.arrangement.movables) if movable.group is not None]
     return sorted(new, key=lambda k: -found.gains[k])
@@ -307,14 +300,16 @@ def _additions(found: Found) -> list[int]:
 
 def _searched(
     poses: PoseSearch,
-    judge: PlacementJudge,
-    movables: list[Movable],
-    slots: list[Movable],
+    judge: judgement.PlacementJudge,
+    movables: list[lights_to_place.Movable],
+    slots: list[lights_to_place.Movable],
     stages: _Stages,
-) -> tuple[Arrangement, Arrangement]:
+) -> tuple[lights_to_place.Arrangement, lights_to_place.Arrangement]:
     """Return the arrangement before all moves, and the best one."""
     paths, steps, sites = poses.paths, poses.steps, tuple(x.light.site for x in movables)
-    start = Arrangement(tuple(movables), sites, steps.fitted(movables, sites, paths.compare))
+    start = lights_to_place.Arrangement(
+        tuple(movables), sites, steps.fitted(movables, sites, paths.compare)
+    )
     # Until here paths are traced and kernels compiled, whose time says nothing about the rest.
     found = poses.by_blocks(start, stages.begin())
     count = stages.begin()
@@ -326,7 +321,10 @@ def _searched(
 
 
 def _placement(
-    scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], names: Sequence[str]
+    scenes: Sequence[Scene],
+    result: _Result,
+    lights: Sequence[lights_to_place.NewLight],
+    names: Sequence[str],
 ) -> Placement:
     """Return the placement of a search result. names: of the lights of the basis."""
     found, moves, additions = result.found, list[Move](), list[AddedLight]()
@@ -368,7 +366,7 @@ def _placement(
     )
 
 
-def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:
+def _emitter(light: lights_to_place.NewLight, site: Site, weight: Any) -> NewEmitter:
     """Return a new light at the place that was found."""
     place = np.array(site.position, dtype=float)
     target = None if site.direction is None else as_position(place + np.array(site.direction))

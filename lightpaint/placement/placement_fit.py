@@ -19,17 +19,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis, BasisLight, Planes
 from lightpaint.images import block_mean
-from lightpaint.lighting import (
-    Constraints,
-    NormalEquations,
-    Solution,
-    denoised_matrix,
-    minimise,
-    reduced_problems,
-)
 from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.
@@ -167,8 +160,8 @@ class PlacementFit:
         for k, look in enumerate(self._looks):
             equations, reduction = self._equations(seen, k), look.reduction
             x = np.zeros(len(reduction.unknowns))
-            for problem in reduced_problems(equations, reduction):
-                x[problem.unknowns] = minimise(
+            for problem in lighting.reduced_problems(equations, reduction):
+                x[problem.unknowns] = lighting.minimise(
                     problem.M,
                     problem.b,
                     lower=problem.lower,
@@ -272,16 +265,16 @@ class PlacementFit:
     def _residual(self, columns: Floats, weights: Doubles) -> Doubles:
         return np.asarray(self._goal - self.picture(columns, weights) * self._root)
 
-    def _equations(self, columns: Floats, k: int) -> NormalEquations:
+    def _equations(self, columns: Floats, k: int) -> lighting.NormalEquations:
         """Return the equations of look k."""
         root, goal = (matrix[:, 3 * k : 3 * k + 3] for matrix in (self._root, self._goal))
         weighed, pull = columns[:, : self.pixels] * root, self._looks[k].pull
         b = np.einsum("ipc,pc->ci", weighed, goal)
-        equations = NormalEquations(_products(weighed), b, np.square(goal).sum(axis=0))
+        equations = lighting.NormalEquations(_products(weighed), b, np.square(goal).sum(axis=0))
         if (noise := columns[:, self.pixels :]).size:
             weighed, goal = noise * root, self._goal_noise[:, 3 * k : 3 * k + 3]
-            equations = NormalEquations(
-                denoised_matrix(equations, _products(weighed)),
+            equations = lighting.NormalEquations(
+                lighting.denoised_matrix(equations, _products(weighed)),
                 b - np.einsum("ipc,pc->ci", weighed, goal),
                 equations.target_norm2 - np.square(goal).sum(axis=0),
             )
@@ -295,10 +288,10 @@ def _products(images: Floats | Doubles) -> Doubles:
 
 def fit_of(
     bases: Sequence[Basis],
-    looks: Sequence[tuple[Solution, Sequence[int]]],
+    looks: Sequence[tuple[lighting.Solution, Sequence[int]]],
     sizes: Sequence[tuple[int, int]],
     new: Sequence[BasisLight] = (),
-    constraints: Constraints | None = None,
+    constraints: lighting.Constraints | None = None,
     *,
     with_panels: bool = False,
     with_noise: bool = True,

@@ -19,6 +19,7 @@ from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats import write_rgb
 from lightpaint.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
+from lightpaint.relit import exported_answer
 from lightpaint.relit.export.exports import blender_script, plain_cell, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
@@ -26,20 +27,6 @@ from lightpaint.relit.export.program_axes import SkyMap
 from lightpaint.relit.export.rig_files import show_copy
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
-from lightpaint.relit.exported_answer import (
-    AnyMap,
-    ExportContext,
-    ExportFormat,
-    SlideImage,
-    Source,
-    WallImage,
-    Writer,
-    emitters_of,
-    rig_lights,
-    sky_maps_of,
-    slide_images_of,
-    wall_images_of,
-)
 from lightpaint.relit.relit_scene import scene_of, scene_patch
 from lightpaint.sentences import Hint, Sentence
 
@@ -47,41 +34,43 @@ from lightpaint.sentences import Hint, Sentence
 UNBOUNDED = 1.0
 
 
-class BlenderFormat(ExportFormat):
+class BlenderFormat(exported_answer.ExportFormat):
     """A Python script that sets lights, or light groups, by name."""
 
     name, file, file_of_groups = "blender", "set_scene.py", "set_lights.py"
     refers_to_maps = True
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the script for lights."""
         lighting, scene, maps = export.lighting, export.source.scene, export.maps
         assert scene is not None
-        slides = [one for one in maps if isinstance(one, SlideImage)]
+        slides = [one for one in maps if isinstance(one, exported_answer.SlideImage)]
         return lambda: scene_script(
-            *(lighting.target, scene.files[0].name, emitters_of(scene, lighting)),
+            *(lighting.target, scene.files[0].name, exported_answer.emitters_of(scene, lighting)),
             places=lighting.places,
             up=lighting.up,
             skies={one.name: one.file for one in maps if isinstance(one, SkyMap)},
-            walls={one.name: one.file for one in maps if isinstance(one, WallImage)},
+            walls={
+                one.name: one.file for one in maps if isinstance(one, exported_answer.WallImage)
+            },
             slides={one.name: (one.file, one.position, one.axes, one.half_size) for one in slides},
             drives={x: light.drives for light in lighting.lights for x in _drive_owners(light)},
         )
 
-    def of_groups(self, export: ExportContext) -> Writer:
+    def of_groups(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the script for light groups."""
         groups = export.source.light_groups
         assert groups is not None
         return lambda: blender_script(groups, export.lighting)
 
 
-class UsdFormat(ExportFormat):
+class UsdFormat(exported_answer.ExportFormat):
     """A layer with the lights of the answer; of light groups, over the stage that they are of."""
 
     name, file, file_of_groups = "usd", "lights.usda", "lights.usda"
     refers_to_maps = True
 
-    def name_for(self, source: Source) -> str:
+    def name_for(self, source: exported_answer.Source) -> str:
         """Return the name of the file. Raises LightpaintError, also without USD's package, or
         without a stage for light groups.
         """
@@ -95,15 +84,15 @@ class UsdFormat(ExportFormat):
             )
         return name
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the layer, and say which images USD has no light for."""
         scene, maps = export.source.scene, export.maps
         assert scene is not None
-        emitters = emitters_of(scene, export.lighting)
-        walls = [one for one in maps if isinstance(one, WallImage)]
+        emitters = exported_answer.emitters_of(scene, export.lighting)
+        walls = [one for one in maps if isinstance(one, exported_answer.WallImage)]
         if meshes := sorted(wall.name for wall in walls if not wall.is_rectangle):
             export.listen.say(f"USD has no image for {some_names(meshes)}, a mesh: set it by hand")
-        if slides := [one for one in maps if isinstance(one, SlideImage)]:
+        if slides := [one for one in maps if isinstance(one, exported_answer.SlideImage)]:
             export.listen.say(
                 f"USD has no projector for {some_names(one.name for one in slides)}: give a light "
                 f"the slide by hand, {some_names(one.file for one in slides)}"
@@ -112,7 +101,7 @@ class UsdFormat(ExportFormat):
         panels = {wall.name: wall.file for wall in walls if wall.is_rectangle}
         return lambda: _layer(export, emitters, skies, panels)
 
-    def of_groups(self, export: ExportContext) -> Writer:
+    def of_groups(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of a layer with multipliers."""
         return lambda: _layer_of_groups(export)
 
@@ -123,7 +112,7 @@ def _drive_owners(light: LightSetting) -> tuple[str, ...]:
 
 
 def _layer(
-    export: ExportContext,
+    export: exported_answer.ExportContext,
     emitters: Sequence[tuple[str, str, RGB]],
     skies: Mapping[str, str],
     panels: Mapping[str, str],
@@ -155,7 +144,7 @@ def _layer(
     return overridden.text
 
 
-def _layer_of_groups(export: ExportContext) -> str:
+def _layer_of_groups(export: exported_answer.ExportContext) -> str:
     """Return a layer with these multipliers, and say which lights its stage lacks."""
     source, lighting = export.source, export.lighting
     assert source.stage is not None
@@ -180,7 +169,7 @@ def _free_weights(lighting: Lighting) -> dict[str, RGB]:
     return {light.name: light.weight for light in lighting.lights if not light.is_fixed}
 
 
-class NukeFormat(ExportFormat):
+class NukeFormat(exported_answer.ExportFormat):
     """A script with nodes of lights, or of layers."""
 
     name, file, file_of_groups = "nuke", "lights.nk", "relit.nk"
@@ -192,13 +181,13 @@ class NukeFormat(ExportFormat):
         " for multipliers of their layers",
     )
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the lights, which says which of them Nuke lacks."""
         lighting, scene = export.lighting, export.source.scene
         assert scene is not None
 
         def write() -> str:
-            lights, left = rig_lights(scene, lighting)
+            lights, left = exported_answer.rig_lights(scene, lighting)
             if left:
                 export.listen.say(f"Nuke has no light like {some_names(left)}: set it by hand")
             about = f"the lights of {scene.files[0].name} as solved for {lighting.target}"
@@ -207,7 +196,7 @@ class NukeFormat(ExportFormat):
 
         return write
 
-    def of_groups(self, export: ExportContext) -> Writer:
+    def of_groups(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the multipliers."""
         groups = export.source.light_groups
         assert groups is not None
@@ -221,7 +210,7 @@ class NukeFormat(ExportFormat):
         return lambda: nuke_script(groups, export.lighting, export.folder)
 
 
-class TableFormat(ExportFormat):
+class TableFormat(exported_answer.ExportFormat):
     """A table of fixtures."""
 
     needs_source = False
@@ -231,7 +220,7 @@ class TableFormat(ExportFormat):
     def text_of(lighting: Lighting) -> str:
         """Return the table of a lighting."""
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return a function that makes the text of the table for the exported lighting."""
         return lambda: self.text_of(export.lighting)
 
@@ -281,26 +270,26 @@ class SpectraFormat(TableFormat):
     text_of = staticmethod(spectra_csv)
 
 
-class MitsubaFormat(ExportFormat):
+class MitsubaFormat(exported_answer.ExportFormat):
     """A patch of the scene's XML."""
 
     name, file = "mitsuba", "relit.patch"
     keeps_lighting = True
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the patch."""
         scene = export.source.scene
         assert scene is not None
         return lambda: scene_patch(scene, export.lighting)
 
 
-class MvrFormat(ExportFormat):
+class MvrFormat(exported_answer.ExportFormat):
     """A copy of the show with the colours and places of the answer."""
 
     name, file, file_of_groups = "mvr", "relit.mvr", "relit.mvr"
     needs_source, needs_rig = False, True
 
-    def of_scene(self, export: ExportContext) -> Writer:
+    def of_scene(self, export: exported_answer.ExportContext) -> exported_answer.Writer:
         """Return the writer of the copy, and say which lights the show lacks."""
         assert export.source.rig is not None
         copied = show_copy(export.source.rig, export.lighting)
@@ -319,7 +308,7 @@ class MvrFormat(ExportFormat):
 
 
 #: All formats by their names, as commands and manifests have them.
-FORMS: dict[str, ExportFormat] = {
+FORMS: dict[str, exported_answer.ExportFormat] = {
     x.name: x
     for x in (
         *(CsvFormat(), JsonFormat(), MitsubaFormat(), UsdFormat()),
@@ -328,7 +317,7 @@ FORMS: dict[str, ExportFormat] = {
 }
 
 
-def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
+def names_of_forms(forms: Iterable[str], source: exported_answer.Source) -> dict[str, str]:
     """Return the file name for each format, after checking its requirements.
 
     Raises LightpaintError for an unknown format, or one whose requirements are not met.
@@ -352,7 +341,11 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
 
 
 def writers_of(
-    names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
+    names: Mapping[str, str],
+    lighting: Lighting,
+    source: exported_answer.Source,
+    folder: Path,
+    listen: Listener,
 ) -> tuple[dict[str, Callable[[], str | bytes | Floats]], str]:
     """Return a function that makes the content of each file, by name, and a remark or "".
 
@@ -364,7 +357,7 @@ def writers_of(
     if not all(FORMS[form].keeps_lighting for form in names):
         elsewhere, remark = _exported(lighting, source)
     maps = _maps(names, elsewhere, source)
-    export = ExportContext(elsewhere, source, folder, listen, maps)
+    export = exported_answer.ExportContext(elsewhere, source, folder, listen, maps)
     writers: dict[str, Callable[[], str | bytes | Floats]] = {}
     for form, name in names.items():
         format_ = FORMS[form]
@@ -388,15 +381,21 @@ def write_content(path: Path, content: str | bytes | Floats) -> None:
         write_rgb(path, content)
 
 
-def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[AnyMap]:
+def _maps(
+    names: Collection[str], lighting: Lighting, source: exported_answer.Source
+) -> list[exported_answer.AnyMap]:
     """Return the maps of image lights that some of the formats refer to."""
     if source.scene is None or not any(FORMS[form].refers_to_maps for form in names):
         return []
-    finders = (sky_maps_of, wall_images_of, slide_images_of)
+    finders = (
+        exported_answer.sky_maps_of,
+        exported_answer.wall_images_of,
+        exported_answer.slide_images_of,
+    )
     return [one for maps_of in finders for one in maps_of(source.scene, lighting)]
 
 
-def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
+def _exported(lighting: Lighting, source: exported_answer.Source) -> tuple[Lighting, str]:
     """Return the lighting for other programs, in which undetermined lights keep the scene's
     colours.
 
@@ -417,7 +416,7 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     )
 
 
-def _check_groups(export: ExportContext) -> None:
+def _check_groups(export: exported_answer.ExportContext) -> None:
     """Raise LightpaintError for light groups that the lighting is not of, or not of all frames."""
     lighting, groups = export.lighting, export.source.light_groups
     assert groups is not None

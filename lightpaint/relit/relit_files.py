@@ -9,14 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import OutputError, SceneError
-from lightpaint.relit.emission_xml import (
-    Changes,
-    luminaire_of,
-    luminaire_xml,
-    set_emission,
-    set_image,
-    set_spectrum,
-)
+from lightpaint.relit import emission_xml
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene import Emitter, Scene, texel_image
 from lightpaint.scene.checks.tokens import tag
@@ -101,7 +94,7 @@ def _edits_of(
     _edit_images(scene, edits, settings, sampled)
     settings = {emitter: rgb for emitter, rgb in settings.items() if emitter.texel is None}
     # Luminaires are written even if they stay as they are: the file has other emitters there.
-    kept = {x: x.emission for x in unchanged if luminaire_of(scene, x) is not None}
+    kept = {x: x.emission for x in unchanged if emission_xml.luminaire_of(scene, x) is not None}
     sampled = {*sampled, *(x for x in kept if x.sampling_weight)}
     unchanged = [emitter for emitter in unchanged if emitter not in kept]
     settings |= kept
@@ -271,12 +264,17 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
         xml.remove(xml.element_at(at))
     images: dict[str, Floats] = {}
     for offset in sorted({*edit.settings, *edit.texel_images, *edit.moved}):
-        if offset in edit.settings and luminaire_of(scene, edit.settings[offset][0]) is not None:
+        if (
+            offset in edit.settings
+            and emission_xml.luminaire_of(scene, edit.settings[offset][0]) is not None
+        ):
             # It has the place that it was moved to.
-            lines = luminaire_xml(scene, *edit.settings[offset], edit.spectra.get(offset))
+            lines = emission_xml.luminaire_xml(
+                scene, *edit.settings[offset], edit.spectra.get(offset)
+            )
             xml.replace_by_lines(xml.element_at(offset), lines)
             continue
-        changes = Changes(xml, xml.element_at(offset))
+        changes = emission_xml.Changes(xml, xml.element_at(offset))
         for name, text in edit.moved.get(offset, {}).items():
             changes.set_element(name, text)
         if offset in edit.settings:
@@ -284,13 +282,13 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
             if offset in edit.spectra:
-                set_spectrum(changes, emitter, edit.spectra[offset])
+                emission_xml.set_spectrum(changes, emitter, edit.spectra[offset])
             else:
-                images |= set_emission(changes, scene, emitter, rgb, stem=stem)
+                images |= emission_xml.set_emission(changes, scene, emitter, rgb, stem=stem)
         if offset in edit.texel_images:
             emitter, image, weight = edit.texel_images[offset]
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
-            images |= set_image(changes, emitter, image, stem=stem)
+            images |= emission_xml.set_image(changes, emitter, image, stem=stem)
         changes.finish()
     return xml.edited(), images

@@ -26,20 +26,8 @@ from lightpaint.images import Estimate, Size, whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Lighting, Solution, joint_estimate, refine
 from lightpaint.progress import Progress, silent
+from lightpaint.relit import verification
 from lightpaint.relit.relit_scene import relight
-from lightpaint.relit.verification import (
-    LIMIT,
-    LOW_POWER,
-    LightShares,
-    Verification,
-    compare,
-    detection_power,
-    differences,
-    largest_difference,
-    light_tests,
-    limit_of_tests,
-    with_light_tests,
-)
 from lightpaint.scene import (
     Scene,
     Stream,
@@ -82,7 +70,7 @@ def verify(
     seed: int = 0,
     stream: Stream = Stream.VERIFICATION,
     progress: Progress = silent,
-) -> Verification:
+) -> verification.Verification:
     """Render the relit scene with random numbers that no basis uses, and compare.
 
     Args:
@@ -115,7 +103,7 @@ def verify(
         label="verification",
         progress=progress,
     )
-    return replace(compare(predicted, verified), spp=relit.spp if spp is None else spp)
+    return replace(verification.compare(predicted, verified), spp=relit.spp if spp is None else spp)
 
 
 def verify_in_stages(
@@ -128,7 +116,7 @@ def verify_in_stages(
     doublings: int = 0,
     seed: int = 0,
     progress: Progress = silent,
-) -> Verification:
+) -> verification.Verification:
     """Render the relit scene until an error of 5 % in the lights would have been detected.
 
     It stops when an error would probably be detected in lights that make up CHECKED of the
@@ -137,9 +125,9 @@ def verify_in_stages(
     size of `relit` or on a reduced film of it. spp: maximum samples per pixel. doublings: how often
     that may be doubled.
     """
-    lights = LightShares.of(basis, lighting)
+    lights = verification.LightShares.of(basis, lighting)
     stages = stages_of(spp, relit.film.block_pixels, doublings=doublings)
-    limit = limit_of_tests(len(stages))
+    limit = verification.limit_of_tests(len(stages))
     relit = sampled_by(relit, shares_of_emitters(relit, lighting, lights.luminance()))
 
     def is_enough(estimate: Estimate, done: int) -> bool:
@@ -155,8 +143,8 @@ def verify_in_stages(
         label="verification",
         progress=progress,
     )
-    judged = replace(compare(predicted, verified), limit=limit, spp=done)
-    return with_light_tests(judged, predicted, lights)
+    judged = replace(verification.compare(predicted, verified), limit=limit, spp=done)
+    return verification.with_light_tests(judged, predicted, lights)
 
 
 def shares_of_emitters(
@@ -194,29 +182,34 @@ def stages_of(spp: int, block_pixels: int = 1, *, doublings: int = 0) -> list[in
 def can_tell(
     predicted: Estimate,
     verified: Estimate,
-    lights: LightShares,
+    lights: verification.LightShares,
     done: float,
     *,
-    limit: float = LIMIT,
+    limit: float = verification.LIMIT,
 ) -> bool:
     """Return whether a verification may stop.
 
     predicted, verified: as in `compare`, of equal size. done: share of the samples rendered so far.
     """
-    tests = light_tests(predicted, verified, lights.blocks, lights.noise)
+    tests = verification.light_tests(predicted, verified, lights.blocks, lights.noise)
     z_lights = dict(zip(lights.names, tests.z.tolist(), strict=True))
-    if largest_difference(*differences(predicted, verified), z_lights, limit=limit) > limit:
+    if (
+        verification.largest_difference(
+            *verification.differences(predicted, verified), z_lights, limit=limit
+        )
+        > limit
+    ):
         return True
     shares = lights.luminance()
-    power = detection_power(predicted, verified, lights, tests, limit=limit)
-    weak_shares = [share for name, share in shares.items() if power[name] < LOW_POWER]
+    power = verification.detection_power(predicted, verified, lights, tests, limit=limit)
+    weak_shares = [share for name, share in shares.items() if power[name] < verification.LOW_POWER]
     if sum(weak_shares) <= 1 - CHECKED and max(weak_shares, default=0.0) < LARGE_SHARE:
         return True
     # With all samples, the noise of the render would be lower by this factor.
     at_end = Estimate(verified.image, verified.half_difference * done**0.5)
-    tests = light_tests(predicted, at_end, lights.blocks, lights.noise)
-    power = detection_power(predicted, at_end, lights, tests, limit=limit)
-    later = [share for name, share in shares.items() if power[name] < LOW_POWER]
+    tests = verification.light_tests(predicted, at_end, lights.blocks, lights.noise)
+    power = verification.detection_power(predicted, at_end, lights, tests, limit=limit)
+    later = [share for name, share in shares.items() if power[name] < verification.LOW_POWER]
     return sum(weak_shares) - sum(later) < UNCHECKED
 
 

@@ -12,16 +12,7 @@ from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting import Appearance, Solution, compare_appearance
-from lightpaint.report.answer_pictures import (
-    CleanLooks,
-    Residual,
-    diverging,
-    report_transform,
-    residual_of,
-    residual_picture,
-    spoken_view,
-    target_picture,
-)
+from lightpaint.report import answer_pictures
 from lightpaint.report.phrases import spoken_progress
 from lightpaint.report.verdict_sentences import are_held_back
 from lightpaint.target import Target
@@ -55,8 +46,8 @@ def comparison_image(
     verified: Floats | None,
     verified_spp: int | None = None,
     appearance: Appearance | None = None,
-    looks: CleanLooks | None = None,
-    missed: Residual | None = None,
+    looks: answer_pictures.CleanLooks | None = None,
+    missed: answer_pictures.Residual | None = None,
 ) -> npt.NDArray[np.uint8]:
     """Draw the pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
@@ -69,9 +60,13 @@ def comparison_image(
     SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    looks = looks or CleanLooks.raw(basis, predicted, verified)
-    transform = looks.encoder(report_transform(target, basis, predicted))
-    view_note = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
+    looks = looks or answer_pictures.CleanLooks.raw(basis, predicted, verified)
+    transform = looks.encoder(answer_pictures.report_transform(target, basis, predicted))
+    view_note = (
+        f" ({answer_pictures.spoken_view(transform)})"
+        if answer_pictures.spoken_view(transform)
+        else ""
+    )
     tiles = [
         _target_tile(target, looks.current, transform=transform),
         Tile(
@@ -90,8 +85,8 @@ def comparison_image(
                 to_8_bit(transform.encode(looks.verified)),
             )
         )
-    missed = missed or residual_of(solution, predicted, transform=transform)
-    picture = residual_picture(
+    missed = missed or answer_pictures.residual_of(solution, predicted, transform=transform)
+    picture = answer_pictures.residual_picture(
         missed, solution, looks.current, transform=transform, finish=to_8_bit
     )
     detail = f"luminance, predicted - target{missed.spoken}"
@@ -106,7 +101,7 @@ def _target_tile(target: Target, current: Floats, *, transform: ViewTransform) -
     return Tile(
         f"target: {target.name}",
         f"{target.spoken_share} painted{f', the rest {rest}' if is_part else ''}",
-        target_picture(target, current, transform=transform, finish=to_8_bit),
+        answer_pictures.target_picture(target, current, transform=transform, finish=to_8_bit),
     )
 
 
@@ -178,7 +173,9 @@ def _scale_bar(
         length = min(width - sum(ends) - 2 * gap, width // 3)
         if length >= width // 6:
             break
-    bar = to_8_bit(diverging(np.linspace(-1, 1, length)))[None].repeat(round(0.9 * font.size), 0)
+    bar = to_8_bit(answer_pictures.diverging(np.linspace(-1, 1, length)))[None].repeat(
+        round(0.9 * font.size), 0
+    )
     draw.text((x, y), low, FAINT, font)
     sheet.paste(Image.fromarray(bar), (x + ends[0] + gap, y + round(0.2 * font.size)))
     draw.text((x + ends[0] + length + 2 * gap, y), high, FAINT, font)

@@ -27,6 +27,7 @@ from lightpaint.lighting import (
 )
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import ERROR, Verification
+from lightpaint.report import measures
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
@@ -34,19 +35,6 @@ from lightpaint.report.answer_pictures import (
     residual_of,
 )
 from lightpaint.report.diagnosis_sentences import UNTOLD_HERE, fit_options
-from lightpaint.report.measures import (
-    ReportedAnswer,
-    brightness,
-    count_at_least_pixels,
-    energy_shares,
-    error_in_codes,
-    halving_spp,
-    linear_residual,
-    most_uncertain,
-    noise_residual,
-    relative_errors,
-    relative_residual,
-)
 from lightpaint.report.page.lights_table import rendering_numbers
 from lightpaint.report.page.limit_sections import maps_limit
 from lightpaint.report.planes_text import planes_numbers
@@ -57,7 +45,7 @@ from lightpaint.version import __version__
 FORMAT = "lightpaint-report 1"
 
 
-def report_numbers(answer: ReportedAnswer, *, missed: Residual | None = None) -> str:
+def report_numbers(answer: measures.ReportedAnswer, *, missed: Residual | None = None) -> str:
     """Return the numbers of a report as JSON. missed: the result of `residual_of`."""
     basis, target, solution = answer.basis, answer.target, answer.solution
     predicted, verification = answer.predicted, answer.verification
@@ -188,9 +176,9 @@ def _choice(choice: ColorChoice) -> dict[str, Any]:
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
     """Return RMS errors relative to the painting, and `norm2`, the scale of the objectives."""
     numbers = {
-        "missed": relative_residual(solution),
-        "noise": noise_residual(solution, predicted),
-        "missed_without_constraints": None if free is None else relative_residual(free),
+        "missed": measures.relative_residual(solution),
+        "noise": measures.noise_residual(solution, predicted),
+        "missed_without_constraints": None if free is None else measures.relative_residual(free),
         "off": sum(not any(light.emission) for light in solution.lighting.lights),
         "norm2": solution.norm2.tolist(),
         "noise_removed": solution.problem.noise_removed,
@@ -198,10 +186,10 @@ def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict
     if solution.problem.refinement is not None:
         numbers["refined"] = solution.problem.refinement.share
     if not solution.problem.is_linear:
-        numbers["missed_in_linear_light"] = linear_residual(solution, predicted)
+        numbers["missed_in_linear_light"] = measures.linear_residual(solution, predicted)
     if solution.certificate.display:
-        numbers["codes_missed"] = error_in_codes(solution)
-    if (brighter := count_at_least_pixels(solution, predicted.image)) is not None:
+        numbers["codes_missed"] = measures.error_in_codes(solution)
+    if (brighter := measures.count_at_least_pixels(solution, predicted.image)) is not None:
         numbers["at_least"], numbers["at_least_and_brighter"] = brighter
     return numbers
 
@@ -210,7 +198,9 @@ def _lights(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None
 ) -> Mapping[str, dict[str, Any]]:
     lighting = solution.lighting
-    shares, current_shares = (energy_shares(basis, x) for x in (lighting, Lighting.current(basis)))
+    shares, current_shares = (
+        measures.energy_shares(basis, x) for x in (lighting, Lighting.current(basis))
+    )
     by_name: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
         # Only channels that reach something painted; the others are undetermined.
@@ -225,7 +215,10 @@ def _lights(
             "stops": math.log2(new / now) if now > 0 and new > 0 else None,
         }
     if uncertainty is not None:
-        errors, (solved, *ends) = relative_errors(uncertainty), brightness(uncertainty)
+        errors, (solved, *ends) = (
+            measures.relative_errors(uncertainty),
+            measures.brightness(uncertainty),
+        )
         for k, numbers in enumerate(by_name.values()):
             numbers["interval"] = [float(end[k]) for end in ends]
             numbers["relative_error"] = float(errors[k])
@@ -259,11 +252,11 @@ def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[
 
 
 def _uncertainty(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
-    k = most_uncertain(basis, solution, uncertainty)
+    k = measures.most_uncertain(basis, solution, uncertainty)
     return {
         "excess": uncertainty.relative_excess,
         "most_uncertain": None if k is None else basis.names[k],
-        "halving_spp": None if k is None else halving_spp(basis, uncertainty, k),
+        "halving_spp": None if k is None else measures.halving_spp(basis, uncertainty, k),
     }
 
 

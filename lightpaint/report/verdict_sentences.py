@@ -2,48 +2,14 @@
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.basis import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting import (
-    CLOSE,
-    Appearance,
-    Delivery,
-    LimitGroup,
-    Reason,
-    Solution,
-    compare_appearance,
-    error_bars,
-    main_deliveries,
-    with_undetermined,
-)
 from lightpaint.relit.verification import ERROR, Verification
-from lightpaint.report.diagnosis_sentences import (
-    ALONE_ADVICE,
-    FIXED_ADVICE,
-    REACH_ADVICE,
-    SAMPLES_ADVICE,
-    SPILL_ADVICE,
-    is_one_painting,
-    lacks_only_wish,
-    named_worst_wish,
-    spoken_came,
-    spoken_deliveries,
-    spoken_delivery,
-    spoken_mean_shares,
-    spoken_newest,
-    spoken_unreached,
-)
-from lightpaint.report.phrases import (
-    NO_CLOSER_TEXT,
-    spoken_difference,
-    spoken_elsewhere,
-    spoken_percent,
-    spoken_progress,
-    spoken_where,
-)
+from lightpaint.report import diagnosis_sentences, phrases
 from lightpaint.scene.lights.texels import image_of
 
 #: Maximum number of barely visible lights that a sentence names.
@@ -66,7 +32,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
 }
 
 #: What keeps the lights from a painting, with its verb.
-LIMIT_SUBJECTS: dict[LimitGroup, str] = {
+LIMIT_SUBJECTS: dict[lighting.LimitGroup, str] = {
     "hold": "Unpainted parts keep",
     "colors": "The colours that lights may have keep",
     "constraints": "Constraints keep",
@@ -85,11 +51,11 @@ NO_MAIN_CAUSE = "for several reasons, none of which accounts for a third of it"
 
 @keywords()
 def verdict(
-    solution: Solution,
+    solution: lighting.Solution,
     predicted: Estimate,
     verification: Verification | None,
     *,
-    appearance: Appearance | None = None,
+    appearance: lighting.Appearance | None = None,
 ) -> str:
     """Return sentences on how close the answer is, and whether a render equals it.
 
@@ -109,9 +75,15 @@ def verdict(
         (start := headline(appearance)),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
-    is_only = len(main_deliveries(appearance.deliveries)) == 1
-    is_told = is_only and (shares := spoken_mean_shares(appearance.deliveries)) and shares in start
-    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not is_told:
+    is_only = len(lighting.main_deliveries(appearance.deliveries)) == 1
+    is_told = (
+        is_only
+        and (shares := diagnosis_sentences.spoken_mean_shares(appearance.deliveries))
+        and shares in start
+    )
+    if (
+        deliveries := diagnosis_sentences.spoken_deliveries(appearance.deliveries, start)
+    ) and not is_told:
         sentences.append(deliveries)
     if not solution.certificate.converged:
         sentences.append("The solve stopped before it converged.")
@@ -126,27 +98,31 @@ def verdict(
     return " ".join(sentences)
 
 
-def _appearance_of(solution: Solution, predicted: Estimate) -> Appearance:
+def _appearance_of(solution: lighting.Solution, predicted: Estimate) -> lighting.Appearance:
     """Compare an answer with its painting, and find out what its samples cannot tell there."""
-    appearance = compare_appearance(solution, predicted)
+    appearance = lighting.compare_appearance(solution, predicted)
     has_miss = appearance.place is not None and not appearance.is_close
-    uncertainty = error_bars(solution) if has_miss else None
+    uncertainty = lighting.error_bars(solution) if has_miss else None
     if uncertainty is None:
         return appearance
-    return with_undetermined(appearance, solution, uncertainty)
+    return lighting.with_undetermined(appearance, solution, uncertainty)
 
 
-def headline(appearance: Appearance) -> str:
+def headline(appearance: lighting.Appearance) -> str:
     """Return sentences on whether the answer is close, what it lacks and why, and side effects.
 
     A cause is named only if it accounts for a third of the error.
     """
-    addition = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
+    addition = (
+        phrases.spoken_elsewhere(appearance.unpainted_change)
+        if appearance.changes_unpainted
+        else ""
+    )
     current = f"{spoken_current(appearance)} " if appearance.is_worse else ""
     return f"{current}{_paint_headline(appearance)} {addition}".rstrip()
 
 
-def spoken_current(appearance: Appearance) -> str:
+def spoken_current(appearance: lighting.Appearance) -> str:
     """Say that the current lighting comes closer than the answer, and offer it unless measuring
     planes have wishes.
     """
@@ -163,76 +139,81 @@ def spoken_current(appearance: Appearance) -> str:
     )
 
 
-def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
+def _wish_headline(appearance: lighting.Appearance, wish: lighting.Delivery) -> str:
     """Return sentences on the wish of which least came, on the newest one, and on the whole.
 
     Of one painting without named wishes the whole goes first.
     """
-    if is_one_painting(appearance.deliveries):
+    if diagnosis_sentences.is_one_painting(appearance.deliveries):
         return f"{spoken_whole(appearance)} {spoken_lack(appearance, wish)}"
-    newest, whole = spoken_newest(appearance), spoken_on_the_whole(appearance)
+    newest, whole = diagnosis_sentences.spoken_newest(appearance), spoken_on_the_whole(appearance)
     return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
 
 
-def spoken_on_the_whole(appearance: Appearance) -> str:
+def spoken_on_the_whole(appearance: lighting.Appearance) -> str:
     """Return `On the whole: about half way.`, after the shares of wishes; "" if there is only one,
     and it is not close.
     """
     if appearance.is_nearly_equal:
         return "On the whole it is close."
-    if len(main_deliveries(appearance.deliveries)) == 1:
+    if len(lighting.main_deliveries(appearance.deliveries)) == 1:
         return ""
-    progress = spoken_progress(appearance.progress)
+    progress = phrases.spoken_progress(appearance.progress)
     return f"On the whole: {progress[:1].lower()}{progress[1:]}."
 
 
-def spoken_whole(appearance: Appearance) -> str:
+def spoken_whole(appearance: lighting.Appearance) -> str:
     """Return a sentence on how much of all that was painted came."""
     if not appearance.is_nearly_equal:
-        return f"{spoken_came(appearance)}."
-    shares = spoken_mean_shares(appearance.deliveries)
+        return f"{diagnosis_sentences.spoken_came(appearance)}."
+    shares = diagnosis_sentences.spoken_mean_shares(appearance.deliveries)
     return f"Close on the whole: {shares}." if shares else "Close on the whole."
 
 
-def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
+def spoken_lack(appearance: lighting.Appearance, wish: lighting.Delivery) -> str:
     """Return sentences on a wish of which too little came: how much, why, and what may help.
 
     The place, lights and reasons of the appearance are about the wish alone.
     """
     if appearance.causes:
-        return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
+        return f"{diagnosis_sentences.spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
     if appearance.place is None:
-        return f"{spoken_delivery(wish)}."
+        return f"{diagnosis_sentences.spoken_delivery(wish)}."
     is_of_color = wish.lacks_color and not wish.lacks_brightness
     if appearance.is_hidden_by_noise:
-        return f"{spoken_delivery(wish)}: {_spoken_hidden(appearance)}. {SAMPLES_ADVICE}"
+        delivery = diagnosis_sentences.spoken_delivery(wish)
+        return f"{delivery}: {_spoken_hidden(appearance)}. {diagnosis_sentences.SAMPLES_ADVICE}"
     reason = _spoken_reach(appearance, is_of_color=is_of_color)
     is_reached = bool(appearance.local_lights) and appearance.has_strong_light
-    advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
+    advice = (
+        diagnosis_sentences.SPILL_ADVICE
+        if is_reached and appearance.reasons_wish
+        else diagnosis_sentences.REACH_ADVICE
+    )
     if is_reached and appearance.lacks_light_of_its_own:
-        advice = ALONE_ADVICE
+        advice = diagnosis_sentences.ALONE_ADVICE
     if appearance.local_lights[:1] == appearance.fixed_lights[:1] != ():
-        advice = FIXED_ADVICE
-    return f"{spoken_unreached(wish)}, since {reason}. {advice}"
+        advice = diagnosis_sentences.FIXED_ADVICE
+    return f"{diagnosis_sentences.spoken_unreached(wish)}, since {reason}. {advice}"
 
 
-def _paint_headline(appearance: Appearance) -> str:
+def _paint_headline(appearance: lighting.Appearance) -> str:
     if appearance.is_close and not (appearance.is_spot and appearance.place):
         # A mean ΔE of more than CLOSE is shown beside it, if noise is what is above.
-        is_noisy = round(appearance.delta_e, 1) > CLOSE
+        is_noisy = round(appearance.delta_e, 1) > lighting.CLOSE
         return f"Close: {'apart from noise, ' if is_noisy else ''}it looks as painted."
-    if (wish := named_worst_wish(appearance)) is not None:
+    if (wish := diagnosis_sentences.named_worst_wish(appearance)) is not None:
         return _wish_headline(appearance, wish)
     if appearance.place is None:
         return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
-    if lacks_only_wish(appearance) and not appearance.is_nearly_equal:
+    if diagnosis_sentences.lacks_only_wish(appearance) and not appearance.is_nearly_equal:
         missing = spoken_missing(appearance)
         text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(appearance)}."
-        advice = f" {ALONE_ADVICE}" if appearance.lacks_light_of_its_own else ""
-        return f"{spoken_came(appearance)}. {text}{advice}"
+        advice = f" {diagnosis_sentences.ALONE_ADVICE}" if appearance.lacks_light_of_its_own else ""
+        return f"{diagnosis_sentences.spoken_came(appearance)}. {text}{advice}"
     if appearance.is_far:
-        where = spoken_where(appearance.place)
-        change = spoken_difference(appearance.place.painted, appearance.place.reached)
+        where = phrases.spoken_where(appearance.place)
+        change = phrases.spoken_difference(appearance.place.painted, appearance.place.reached)
         painted = f"{where} the paint is {change} than the lights make it"
         return f"{_headline_start(appearance)}: {painted}; {spoken_reason(appearance)}."
     state = (
@@ -242,12 +223,12 @@ def _paint_headline(appearance: Appearance) -> str:
     return f"{start} the {missing} {state}: {spoken_reason(appearance)}."
 
 
-def _headline_start(appearance: Appearance) -> str:
+def _headline_start(appearance: lighting.Appearance) -> str:
     if appearance.is_nearly_equal:
         return "Close, but"
     if not appearance.is_far:
-        far = spoken_progress(appearance.progress)
-        return f"{far}, and" if far == NO_CLOSER_TEXT else f"{far}, but"
+        far = phrases.spoken_progress(appearance.progress)
+        return f"{far}, and" if far == phrases.NO_CLOSER_TEXT else f"{far}, but"
     # "The lights cannot" would not be true if something else holds them.
     if appearance.causes:
         return f"{LIMIT_SUBJECTS[appearance.limit_groups[0]]} the lights from this"
@@ -260,15 +241,17 @@ def _headline_start(appearance: Appearance) -> str:
     )
 
 
-def spoken_missing(appearance: Appearance) -> str:
+def spoken_missing(appearance: lighting.Appearance) -> str:
     """Return the main error in words: `brighter light on the floor`. It must have a place."""
     assert appearance.place is not None
-    change = spoken_difference(appearance.place.painted, appearance.place.reached)
+    change = phrases.spoken_difference(appearance.place.painted, appearance.place.reached)
     light = "shadow" if is_darker(appearance) else "light"
-    return f"{change.replace('a little', 'slightly')} {light} {spoken_where(appearance.place)}"
+    return (
+        f"{change.replace('a little', 'slightly')} {light} {phrases.spoken_where(appearance.place)}"
+    )
 
 
-def spoken_reason(appearance: Appearance) -> str:
+def spoken_reason(appearance: lighting.Appearance) -> str:
     """Return the causes of the largest error as text: the main cause first."""
     assert appearance.place is not None
     if appearance.causes:
@@ -280,19 +263,19 @@ def spoken_reason(appearance: Appearance) -> str:
     return _spoken_reach(appearance)
 
 
-def _spoken_causes(appearance: Appearance) -> str:
+def _spoken_causes(appearance: lighting.Appearance) -> str:
     *first_phrases, last = (_spoken_cause(appearance, reason) for reason in appearance.causes)
     return f"{', '.join(first_phrases)}, and {last}" if first_phrases else last
 
 
-def _spoken_cause(appearance: Appearance, reason: Reason) -> str:
+def _spoken_cause(appearance: lighting.Appearance, reason: lighting.Reason) -> str:
     """Return a reason as text: a hold matters where no light reaches the paint alone."""
     if reason.kind == "hold" and appearance.lacks_light_of_its_own:
         return _spoken_spill(appearance)
     return spoken_holding(reason)
 
 
-def _spoken_reach(appearance: Appearance, *, is_of_color: bool = False) -> str:
+def _spoken_reach(appearance: lighting.Appearance, *, is_of_color: bool = False) -> str:
     """Return why no light brings what is missing in the place of most error.
 
     is_of_color: whether it is colour and not brightness.
@@ -324,13 +307,13 @@ def _spoken_reach(appearance: Appearance, *, is_of_color: bool = False) -> str:
     return f"{free_names} would light too much else"
 
 
-def _spoken_hidden(appearance: Appearance) -> str:
+def _spoken_hidden(appearance: lighting.Appearance) -> str:
     """Return which lights that reach the place the samples do not determine."""
     names = _spoken_some(appearance.hidden_lights)[0]
     return f"too few samples tell what {names} can do there"
 
 
-def _spoken_spill(appearance: Appearance) -> str:
+def _spoken_spill(appearance: lighting.Appearance) -> str:
     """Return what the lights of the paint light, too; "" if that is not known."""
     area = appearance.area_lights
     if area is None or (area.is_alone and not area.also):
@@ -341,7 +324,7 @@ def _spoken_spill(appearance: Appearance) -> str:
     return f"no light reaches it alone; {spill}" if appearance.lacks_light_of_its_own else spill
 
 
-def spoken_holding(reason: Reason) -> str:
+def spoken_holding(reason: lighting.Reason) -> str:
     """Return a reason that keeps the lights from the paint: `annex_window is switched off`."""
     singular, plural = REASON_CLAUSES[reason.kind]
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
@@ -357,9 +340,9 @@ def spoken_holding(reason: Reason) -> str:
     return (singular if len(reason.names) == 1 else plural).format(lights)
 
 
-def spoken_noise(appearance: Appearance) -> str:
+def spoken_noise(appearance: lighting.Appearance) -> str:
     """Return a clause on noise, if it is a third of the error; else ""."""
-    share = spoken_percent(appearance.noise_shares.get(appearance.main_noise, 0.0))
+    share = phrases.spoken_percent(appearance.noise_shares.get(appearance.main_noise, 0.0))
     if appearance.main_noise == "noise":
         return f"{share} of the difference from the painting is render noise"
     if appearance.main_noise == "painting_noise":
@@ -367,12 +350,12 @@ def spoken_noise(appearance: Appearance) -> str:
     return ""
 
 
-def are_held_back(appearance: Appearance) -> bool:
+def are_held_back(appearance: lighting.Appearance) -> bool:
     """Return whether something that may be loosened keeps the lights from a painting."""
     return bool(appearance.causes) or _are_kept(appearance)
 
 
-def _are_kept(appearance: Appearance) -> bool:
+def _are_kept(appearance: lighting.Appearance) -> bool:
     """Return whether constraints hold back all lights that contribute much to the place."""
     is_short = (
         appearance.place is not None and appearance.has_strong_light and not is_darker(appearance)
@@ -389,7 +372,7 @@ def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
     return some_names(joined_texels(names)[:2], joint=" and "), len(names) == 1
 
 
-def is_darker(appearance: Appearance) -> bool:
+def is_darker(appearance: lighting.Appearance) -> bool:
     """Return whether the worst place is painted darker than the lights make it."""
     assert appearance.place is not None
     painted, reached = (
@@ -398,7 +381,7 @@ def is_darker(appearance: Appearance) -> bool:
     return bool(painted < reached)
 
 
-def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
+def spoken_delta_e(appearance: lighting.Appearance, *, known: bool) -> str:
     """Return `Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
     noise = f"noise explains {appearance.noise:.1f}" if known else "noise included"
     now = f"{appearance.requested_change:.1f} as the scene is now"

@@ -14,18 +14,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint import images
 from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images import (
-    AT_LEAST,
-    block_mean,
-    check_factor,
-    check_size,
-    resampled,
-    whole_factor,
-)
 from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
@@ -80,12 +73,12 @@ class Wish:
 
     def resized(self, size: tuple[int, int]) -> "Wish":
         """Return the wish resampled to `size` (height, width)."""
-        area = np.clip(resampled(self.area[..., None], size)[..., 0], 0, 1)
+        area = np.clip(images.resampled(self.area[..., None], size)[..., 0], 0, 1)
         return replace(self, area=np.asarray(area, np.float32))
 
     def reduced(self, factor: int) -> "Wish":
         """Return the wish averaged over blocks of factor × factor pixels."""
-        return replace(self, area=np.asarray(block_mean(self.area, factor), np.float32))
+        return replace(self, area=np.asarray(images.block_mean(self.area, factor), np.float32))
 
     def cropped(self, height: int, width: int) -> "Wish":
         """Return the top left part, of this size."""
@@ -289,7 +282,7 @@ class Target(Shown):
         """Return the target resampled to `size` (height, width), in linear light, weighted by
         importance. Raises SizeError for a size that no image has.
         """
-        check_size(size)
+        images.check_size(size)
         if size == self.size:
             return self
         return self._with_pixels(
@@ -317,7 +310,7 @@ class Target(Shown):
         block, the squared residual stays the same up to a constant. Raises
         SizeError where the target has no such blocks.
         """
-        check_factor(self.size, factor)
+        images.check_factor(self.size, factor)
         if factor == 1:
             return self
         return self._with_pixels(
@@ -356,8 +349,8 @@ class Target(Shown):
         if it was painted in full size for a basis on a reduced film. Raises SizeError if it has
         another size and must not be resampled.
         """
-        check_size(size)
-        if factor := whole_factor(self.size, size):
+        images.check_size(size)
+        if factor := images.whole_factor(self.size, size):
             return self.reduced(factor)
         if self.size != size and not resize:
             raise SizeError(
@@ -450,7 +443,7 @@ def write_painting(path: Path, target: Target) -> None:
     painted = Painted(FORMAT, target.over_look, target.through_view, name, stops)
     channels = rgb_channels(target.image) | {"W": target.importance.astype(np.float32)}
     if target.at_least is not None and target.at_least.any():
-        channels |= rgb_channels(target.at_least.astype(np.float32), AT_LEAST)
+        channels |= rgb_channels(target.at_least.astype(np.float32), images.AT_LEAST)
     write_parts(path, [ExrPart("rgb", channels, {KEY: json.dumps(fields_of(painted))})])
 
 

@@ -18,21 +18,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images import Picture, box_mean, read_mask, read_picture
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.painted_pixels import (
-    LOSSY,
-    ROUNDING,
-    SHARP_RADIUS,
-    compressed_like,
-    lossy_difference,
-    painted_where,
-)
-from lightpaint.target.painted_target import (
-    Target,
-    describe_negative,
-    painted_of,
-    share_of,
-    spoken_share,
-)
+from lightpaint.target import painted_pixels, painted_target
 from lightpaint.target.template import (
     CLEAN,
     LIGHT_FILE,
@@ -99,7 +85,7 @@ def read_target(
     template: str | Path | None = None,
     find: bool = True,
     paint: Paint = "look",
-) -> Target:
+) -> painted_target.Target:
     """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
 
     Importance comes from the first of these that exists: `mask`; an EXR's W channel; alpha; the
@@ -131,7 +117,7 @@ def read_target(
 
 def read_over_look(
     path: Path, look: Floats, name: str, *, layer: str | None, transform: TransformChoice
-) -> Target | None:
+) -> painted_target.Target | None:
     """Return the painting at `path` if it was painted over `look`; None if it was not.
 
     For a painting that does not itself say what counts, and whose template is unknown. look: (h, w,
@@ -145,27 +131,29 @@ def read_over_look(
     if picture.transform is not None:
         picture = read_picture(path, layer=layer, transform=view)
     template = Template(look, view)
-    if not painted_where(path, picture, template).any():
+    if not painted_pixels.painted_where(path, picture, template).any():
         return None  # it is the look itself, so all of it counts
     shown = None if picture.transform is None else view
     transform_text = "" if shown is None else f" through {shown.spoken}"
     return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{transform_text}"))
 
 
-def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
+def _target_of(
+    reading: _Reading, mask: str | Path | None = None, paint: Paint = "look"
+) -> painted_target.Target:
     """Find the painted pixels and create the target. mask, paint: as in `read_target`."""
     picture, template = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever the mask.
     is_there = picture.finite if picture.stored is None else picture.finite & picture.stored
     counted = np.where(is_there, 1 if importance is None else importance, 0)
-    image, painted = picture.image, painted_of(picture.attributes, reading.path)
+    image, painted = picture.image, painted_target.painted_of(picture.attributes, reading.path)
     if paint == "light":
         image, counted, note = _lit(reading, counted)
     else:
         note = _beyond(reading, counted)
     note = [*note, *_below_zero(image, counted > 0)]
-    return Target(
+    return painted_target.Target(
         name=reading.path.stem,
         image=image,
         importance=counted.astype(np.float32),
@@ -187,13 +175,13 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
             *([] if mask is None else [Path(mask)]),
             *([] if reading.folder is None else template_files(reading.folder)),
         ),
-        full_size_share=None if importance is None else share_of(importance),
+        full_size_share=None if importance is None else painted_target.share_of(importance),
     )
 
 
 def _below_zero(image: Floats, counts: npt.NDArray[np.bool_]) -> list[str]:
     """Return a remark on paint below 0, which may be a colour outside Rec.709 or a mistake."""
-    text = describe_negative(image, counts)
+    text = painted_target.describe_negative(image, counts)
     return [f"{text}: no light makes that, and black comes closest"] if text else []
 
 
@@ -229,7 +217,7 @@ def _open_picture(
         # The painting has another template, and therefore another transform.
         base, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=choice)
-    own_marks = painted_of(picture.attributes, path)
+    own_marks = painted_target.painted_of(picture.attributes, path)
     if own_marks is not None:
         otherwise = own_marks.transform
     shown = picture.transform or (otherwise if choice.is_open else choice.over(otherwise))
@@ -267,8 +255,8 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         return None, [note]
     if template is None or not is_opaque:
         return picture.alpha, []
-    importance = painted_where(path, picture, template)
-    share = share_of(importance)
+    importance = painted_pixels.painted_where(path, picture, template)
+    share = painted_target.share_of(importance)
     if share == 0:
         folder = Path(reading.painted_on).parent
         if path.resolve() in [
@@ -282,7 +270,9 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
             Hint("find", False),
             " if all of it counts",
         )
-    painted_text = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
+    painted_text = (
+        f"{painted_target.spoken_share(share)} painted: what differs from {reading.painted_on}"
+    )
     if share > NEARLY_ALL and (remark := _of_all(picture, template)):
         return importance, [Sentence(painted_text, "; ", remark)]
     return importance, [painted_text]
@@ -293,7 +283,9 @@ def _of_all(picture: Picture, template: Template) -> str:
     transform = picture.transform or template.transform
     codes, template_codes = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # compression preserves the means of a few pixels
-        codes, template_codes = (box_mean(x, SHARP_RADIUS) for x in (codes, template_codes))
+        codes, template_codes = (
+            box_mean(x, painted_pixels.SHARP_RADIUS) for x in (codes, template_codes)
+        )
     return explain_mismatch(codes, template_codes)
 
 
@@ -414,11 +406,13 @@ def _agreement(
         return 0.0, 0.0
     if picture.lossy:
         difference, tolerance = (
-            lossy_difference(display, compressed_like(path, encoded_look)),
-            LOSSY,
+            painted_pixels.lossy_difference(
+                display, painted_pixels.compressed_like(path, encoded_look)
+            ),
+            painted_pixels.LOSSY,
         )
     else:
-        difference, tolerance = largest(np.abs(display - encoded_look)), ROUNDING
+        difference, tolerance = largest(np.abs(display - encoded_look)), painted_pixels.ROUNDING
     is_same = difference[is_informative] <= tolerance
     if not is_same.any():
         return 0.0, 0.0

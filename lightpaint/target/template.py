@@ -15,15 +15,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import LightpaintError, TargetError, ViewError
 from lightpaint.files import one_line, read_text, write_bytes, write_text
-from lightpaint.images.formats import (
-    TRANSFORM_KEY,
-    ExrPart,
-    png_bytes,
-    read_parts,
-    write_parts,
-    write_png_16,
-    write_rgb,
-)
+from lightpaint.images import formats
 from lightpaint.sentences import Datum
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.storage.staging import is_below, staged
@@ -143,12 +135,14 @@ def write_template(
         )
         for name, image in optional.items():
             if name == DEPTH:
-                write_parts(stage / DEPTH, [ExrPart("depth", {"Y": image.astype(np.float32)})])
+                formats.write_parts(
+                    stage / DEPTH, [formats.ExrPart("depth", {"Y": image.astype(np.float32)})]
+                )
             else:
                 attributes = texts.get(SHOWN_FILE) if name == CLEAN else None
-                write_rgb(stage / name, image, attributes=attributes)
+                formats.write_rgb(stage / name, image, attributes=attributes)
         for file, matte in zip(matte_files, mattes.values(), strict=True):
-            write_bytes(stage / file, png_bytes(to_8_bit(matte)))
+            write_bytes(stage / file, formats.png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
             thumbnail = _thumbnail(look, template.transform.name, texts.get(LIGHTS))
             write_bytes(stage / file, thumbnail)
@@ -160,7 +154,7 @@ def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) ->
     """Return a linear picture as PNG, exposed to be visible at any brightness."""
     white_level = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
     shown = ViewTransform(transform, float(np.clip(-np.log2(white_level), -60, 60)))
-    return png_bytes(to_8_bit(shown.encode(look)), texts)
+    return formats.png_bytes(to_8_bit(shown.encode(look)), texts)
 
 
 def _record_text(template: Template, files: Iterable[str]) -> str:
@@ -217,10 +211,10 @@ def write_look(
 
     clean: picture for the PNG instead of `image`. texts: texts for its header.
     """
-    write_rgb(path, image)
+    formats.write_rgb(path, image)
     picture = path.with_suffix(".png")
     shown = transform.encode(image if clean is None else clean)
-    write_png_16(picture, shown, texts=texts_of(transform) | dict(texts or {}))
+    formats.write_png_16(picture, shown, texts=texts_of(transform) | dict(texts or {}))
     return picture
 
 
@@ -269,7 +263,7 @@ def _read_about(folder: Path) -> tuple[_TemplateRecord, ViewTransform]:
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
-    image = read_parts(path)[0].rgb()
+    image = formats.read_parts(path)[0].rgb()
     height, width, _ = image.shape
     if size != (width, height):
         raise TargetError(path, f" is {width}x{height}, but {RECORD_FILE} says {size[0]}x{size[1]}")
@@ -309,4 +303,4 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 def texts_of(transform: ViewTransform) -> dict[str, str]:
     """Return the text for a PNG that names its transform."""
-    return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}
+    return {formats.TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

@@ -367,7 +367,7 @@ def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpaint.batch.run.obtain_bases", too_large)
+        patch.setattr("lightpaint.batch.task_bases.obtain_bases", too_large)
         completed = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
     assert completed.returncode == 1
     assert "it takes more memory than there is" in completed.stderr

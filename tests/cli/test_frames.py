@@ -11,9 +11,9 @@ from light_groups import interleaved, pictures
 
 import lightpaint as lp
 from lightpaint.basis.lightgroups.frame_sequence import find_frames
+from lightpaint.images import formats
 from lightpaint.images.formats.exr import read_parts, write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline import relit_renders
 
 NAMES = ("fill", "key", "rim")
 FRAMES = (1, 2, 3, 4)
@@ -124,7 +124,7 @@ def test_frames_of_this_answer_are_written_once(
     paint(tmp_path, 2, SET[0])
     arguments = ("solve", "shot.####.exr", "p.0002.exr", "-o", "out", "--frames", "all")
     written: list[str] = []
-    write_parts = relit_renders.write_parts
+    write_parts = formats.write_parts
 
     def watched(path: Path, parts: Any) -> None:
         if len(written) == 2:
@@ -132,13 +132,13 @@ def test_frames_of_this_answer_are_written_once(
         write_parts(path, parts)
         written.append(path.name)
 
-    monkeypatch.setattr(relit_renders, "write_parts", watched)
+    monkeypatch.setattr(formats, "write_parts", watched)
     completed = run(tmp_path, *arguments)
     assert completed.returncode == 130
     assert "frames that are written stay; the same command goes on" in completed.stderr
     written[:] = ["", ""]  # as if the process were a new one
     monkeypatch.setattr(
-        relit_renders, "write_parts", lambda *x: (write_parts(*x), written.append(x[0].name))
+        formats, "write_parts", lambda *x: (write_parts(*x), written.append(x[0].name))
     )
     completed = run(tmp_path, *arguments)
     assert completed.returncode == 0, completed.stderr

@@ -23,6 +23,7 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.errors import ImageError, PaintError
+from lightpaint.images import formats
 from lightpaint.images.formats import openraster
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
 from lightpaint.images.formats.openraster import RasterGroup, opened_openraster
@@ -362,7 +363,7 @@ def test_the_size_of_a_file_is_compared_before_its_pixels_are_read(
     write_layers_exr(tmp_path / "layers.exr", layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
     (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png"]))
     monkeypatch.setattr(openraster, "read_bitmap", None)
-    monkeypatch.setattr(layer_files, "read_parts", None)
+    monkeypatch.setattr(formats, "read_parts", None)
     for name in ("layers.exr", "layers.ora"):
         with pytest.raises(PaintError, match="70x12 pixels, and the view 8x9"):
             read_layers(tmp_path / name, (9, 8), TRANSFORM)

@@ -24,7 +24,7 @@ from lightpaint.cli import main
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.rig import lamp_rig
+from lightpaint.paint.rig import lamp_rig, page_geometry
 from lightpaint.paint.rig.light_placer import SearchNotes
 from lightpaint.paint.session.live_answer import changed_requests
 from lightpaint.paint.store.session_file import Store
@@ -198,7 +198,7 @@ def test_the_scene_is_read_before_the_renderer_is_used(monkeypatch: pytest.Monke
         order.append("renderer")
         yield
 
-    monkeypatch.setattr(lamp_rig, "in_this_thread", rendering)
+    monkeypatch.setattr(page_geometry, "in_this_thread", rendering)
     monkeypatch.setattr(lamp_rig, "open_view", lambda *_: order.append("view"))
     lamp_rig.LampRig([UnreadSubject()]).open([None])  # type: ignore[list-item]
     assert order == ["scene", "renderer", "view"]

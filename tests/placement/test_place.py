@@ -126,7 +126,7 @@ def test_nothing_moves_where_nothing_is_missed(
     room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor does anybody take time for how certain the places of lights are that stay."""
-    monkeypatch.setattr("lightpaint.placement.place_search.PlacementJudge.errors", None)
+    monkeypatch.setattr("lightpaint.placement.search.judgement.PlacementJudge.errors", None)
     free = {"bulb": lp.Freedom(within=0.5), "beam": lp.Freedom(aim=40), "sun": lp.Freedom(aim=20)}
     placement = placed(room, room, free)
     assert placement.moves == ()

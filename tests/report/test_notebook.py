@@ -16,7 +16,7 @@ from lightpaint.basis.light_basis import Basis
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.problem import Problem
 from lightpaint.pipeline.results.look import Look
-from lightpaint.relit.verification_render import compare
+from lightpaint.relit.verification import compare
 from lightpaint.scene.mitsuba_scene import Scene
 
 MANY = 120

@@ -9,11 +9,8 @@ import pytest
 from lightpaint.colour.primaries import to_8_bit
 from lightpaint.images.estimate import Estimate
 from lightpaint.relit.verification import LIMIT, Verification, compare
-from lightpaint.report.page.figures import (
-    UNMEASURED,
-    diverging,
-    verification_picture,
-)
+from lightpaint.report.answer_pictures import diverging
+from lightpaint.report.page.figures import UNMEASURED, verification_picture
 
 #: The left half is evenly lit; light finds the right half, a curtain, once in 128 samples.
 SIZE, CURTAIN = (64, 96), np.s_[:, 48:]

@@ -23,14 +23,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint import report
 from lightpaint.basis import Basis, LightGroups, light_images
-from lightpaint.batch.gallery.summary import (
-    SummaryRow,
-    drop_pictures,
-    rows_of,
-    summary_csv,
-    summary_json,
-    view_folders,
-)
+from lightpaint.batch.gallery import summary
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import SUMMARY, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
@@ -84,18 +77,18 @@ class GroupPlaces:
 
 def write_gallery(
     folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]
-) -> list[SummaryRow]:
+) -> list[summary.SummaryRow]:
     """Write index.html, contact.png, summary.csv and summary.json of the results so far.
 
     Returns the rows, failures first.
     """
-    rows = rows_of(plan, lines)
+    rows = summary.rows_of(plan, lines)
     rows.sort(key=lambda row: ("failed", "waiting", "done").index(row.state))
-    drop_pictures(folder, rows)
+    summary.drop_pictures(folder, rows)
     bases = bases_of_rows(folder, plan)
     drop_planes(folder, set(bases.values()))
-    write_text(folder / SUMMARY, summary_json(rows))
-    write_text(folder / "summary.csv", summary_csv(rows))
+    write_text(folder / SUMMARY, summary.summary_json(rows))
+    write_text(folder / "summary.csv", summary.summary_csv(rows))
     write_text(folder / "index.html", _page(folder, plan, rows, bases))
     write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))
     return rows
@@ -106,18 +99,20 @@ def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
     return {
         place.relative_to(plan.folder).as_posix(): planes_name(folder, key)
         for look in plan.looks
-        for place, key in zip(view_folders(look), look.steps[0].task.bases, strict=False)
+        for place, key in zip(summary.view_folders(look), look.steps[0].task.bases, strict=False)
     }
 
 
-def _page(folder: Path, plan: Plan, rows: Sequence[SummaryRow], bases: Mapping[str, str]) -> str:
+def _page(
+    folder: Path, plan: Plan, rows: Sequence[summary.SummaryRow], bases: Mapping[str, str]
+) -> str:
     return gallery_page(folder, plan.manifest.name, rows, bases, places=places_of(plan))
 
 
 def gallery_page(
     folder: Path,
     title: str,
-    rows: Sequence[SummaryRow],
+    rows: Sequence[summary.SummaryRow],
     bases: Mapping[str, str] | None = None,
     *,
     places: Sequence[GroupPlaces] = (),
@@ -173,7 +168,7 @@ def _group_places(group: PlaceGroup, record: PlacementRecord) -> GroupPlaces:
     return GroupPlaces(placement.shared_sentence, placement.changes, picture)
 
 
-def counts_text(rows: Sequence[SummaryRow]) -> str:
+def counts_text(rows: Sequence[summary.SummaryRow]) -> str:
     """Return `12 looks: 1 failed, 2 not done yet`."""
     counts = {state: sum(row.state == state for row in rows) for state in ("failed", "waiting")}
     parts = [f"{counts['failed']} failed"] * bool(counts["failed"])
@@ -182,7 +177,7 @@ def counts_text(rows: Sequence[SummaryRow]) -> str:
     return f"{looks}: {', '.join(parts) or 'all done'}"
 
 
-def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
+def contact_sheet(folder: Path, rows: list[summary.SummaryRow]) -> Any:
     """Return small pictures side by side with their names, (H, W, 3) uint8.
     Only the first MAX_PICTURES are drawn.
     """
@@ -211,7 +206,11 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
 
 
 def _draw(
-    sheet: Image.Image, folder: Path, row: SummaryRow, box: tuple[int, int, int, int], font: Any
+    sheet: Image.Image,
+    folder: Path,
+    row: summary.SummaryRow,
+    box: tuple[int, int, int, int],
+    font: Any,
 ) -> None:
     """Draw one look in its box (x, y, width, height), with its name and miss below."""
     (x, y, width, height), draw = box, ImageDraw.Draw(sheet)
@@ -258,7 +257,7 @@ def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookE
 
 def write_solve_gallery(
     folder: Path, entries: Sequence[LookEntry], failures: Mapping[str, str], bases: Sequence[Basis]
-) -> list[SummaryRow]:
+) -> list[summary.SummaryRow]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
     failures: reasons by name. bases: one for each view, shared by all looks.
@@ -285,13 +284,13 @@ def _content_hash(path: Path) -> str:
 
 
 def mixers_html(
-    folder: Path, rows: Sequence[SummaryRow], bases: Mapping[str, str]
+    folder: Path, rows: Sequence[summary.SummaryRow], bases: Mapping[str, str]
 ) -> dict[str, Markup]:
     """Return the first mixers as sections of HTML, by their names.
 
     folder: of the batch. rows: candidates. bases: name of each row's planes, by the row's folder.
     """
-    rows_by_basis: dict[str, list[SummaryRow]] = {}
+    rows_by_basis: dict[str, list[summary.SummaryRow]] = {}
     for row in rows:
         if row.lights and row.folder in bases:
             rows_by_basis.setdefault(bases[row.folder], []).append(row)
@@ -306,7 +305,7 @@ def mixers_html(
 
 
 def _mixer(
-    folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[SummaryRow]
+    folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[summary.SummaryRow]
 ) -> Markup:
     """Return one mixer. record: as `write_planes` wrote it."""
     lights = [
@@ -337,7 +336,7 @@ def _mixer(
     return Markup(section).format(name, Markup(script_json(data)))
 
 
-def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> list[int]:
+def _strongest_lights(record: Mapping[str, Any], rows: Sequence[summary.SummaryRow]) -> list[int]:
     """Return the lights that get sliders, by their index in the basis: all, if they are few, but
     for the texels of images.
     """
@@ -354,7 +353,7 @@ def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> 
     return sorted(sorted(singles, key=lambda k: -share[names[k]])[:MAX_LIGHTS])
 
 
-def transforms_of(rows: Sequence[SummaryRow]) -> dict[str, Any]:
+def transforms_of(rows: Sequence[summary.SummaryRow]) -> dict[str, Any]:
     """Return the looks' view transforms by name; the exposure belongs to each look."""
     transforms = {"srgb": report.transform_data(ViewTransform())}
     for name in dict.fromkeys(row.view[0] for row in rows if row.view):

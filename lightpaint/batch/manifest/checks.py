@@ -7,15 +7,8 @@ from glob import has_magic
 from pathlib import Path
 from typing import Any
 
+from lightpaint.batch.manifest import keys
 from lightpaint.batch.manifest.file_names import files_matching
-from lightpaint.batch.manifest.keys import (
-    SOLVED_WORDS,
-    SOURCE_KEYS,
-    SUBJECT_KEYS,
-    Handover,
-    Mistakes,
-    near_key,
-)
 from lightpaint.batch.manifest.looks_file import Manifest, Table, subject_keys
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
@@ -37,11 +30,11 @@ CONSTRAINT_KEYS = (
 )
 
 
-def check_combination(mistakes: Mistakes, table: Table) -> None:
+def check_combination(mistakes: keys.Mistakes, table: Table) -> None:
     """Add keys that are missing or contradict each other to the mistakes."""
     label, look = table.label, table.values
     subjects = subject_keys(look)
-    if not table.has(*SUBJECT_KEYS):
+    if not table.has(*keys.SUBJECT_KEYS):
         mistakes.add(
             label, "nothing to show: give painting, paintings, views, lighting or lightings"
         )
@@ -73,12 +66,12 @@ def check_combination(mistakes: Mistakes, table: Table) -> None:
     if "share" in look:
         _check_share(mistakes, table, is_given=is_given)
     if is_given and (
-        unusable := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]
+        unusable := [word for word in look.get("variations", ()) if word in keys.SOLVED_WORDS]
     ):
         mistakes.add(label, f"variations has {unusable[0]!r}, and its lighting is given")
 
 
-def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
+def _check_share(mistakes: keys.Mistakes, table: Table, *, is_given: bool) -> None:
     """Add keys that contradict `share = "places"` to the mistakes."""
     look = table.values
     if is_given:
@@ -93,7 +86,7 @@ def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
         )
 
 
-def check_by_sums(mistakes: Mistakes, table: Table) -> None:
+def check_by_sums(mistakes: keys.Mistakes, table: Table) -> None:
     """Add keys that contradict a request for the lighting alone to the mistakes."""
     label, look = table.label, table.values
     if len(look["want"]) > 1:
@@ -108,20 +101,20 @@ def check_by_sums(mistakes: Mistakes, table: Table) -> None:
             mistakes.add(label, f"want has 'lights', and {key} needs images: leave it out")
 
 
-def _check_basis_keys(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> None:
+def _check_basis_keys(mistakes: keys.Mistakes, label: str, look: Mapping[str, Any]) -> None:
     """Add keys that a saved basis cannot use to the mistakes."""
     for step in ("verify", "render"):
         if step in look.get("want", ()):
             mistakes.add(label, f"want has {step!r}, which needs the scene: give scene = ...")
     if unusable_keys := [
-        key for key in SOURCE_KEYS if key in look and key not in (*BASES, "pattern")
+        key for key in keys.SOURCE_KEYS if key in look and key not in (*BASES, "pattern")
     ]:
         mistakes.add(
             label, f"{some_names(unusable_keys)} cannot change a saved basis: leave it out"
         )
 
 
-def check_step_tables(mistakes: Mistakes, table: Table) -> None:
+def check_step_tables(mistakes: keys.Mistakes, table: Table) -> None:
     """Add a [render] or [export] table whose step `want` lacks to the mistakes."""
     for step in ("render", "export"):
         if (
@@ -134,7 +127,9 @@ def check_step_tables(mistakes: Mistakes, table: Table) -> None:
             )
 
 
-def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: Any) -> None:
+def check_handover(
+    mistakes: keys.Mistakes, label: str, handover: keys.Handover, entry: Any
+) -> None:
     """Add exports that a look cannot have to the mistakes. entry: one of its looks."""
     has_groups = isinstance(entry.basis, GroupsFile)
     for form in handover.to:
@@ -152,7 +147,7 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
             mistakes.add(f"{label}, export", error.sentence)
 
 
-def check_sequence(mistakes: Mistakes, table: Table) -> None:
+def check_sequence(mistakes: keys.Mistakes, table: Table) -> None:
     """Add a sequence's errors to the mistakes: it needs looks and frames, or a path of sensors."""
     label, values = table.label, table.values
     path, frames = values.get("sensors"), values.get("frames")
@@ -209,11 +204,11 @@ def constraints_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> C
     return constraints
 
 
-def _constraints(mistakes: Mistakes, label: str, table: Mapping[str, Any]) -> Constraints:
+def _constraints(mistakes: keys.Mistakes, label: str, table: Mapping[str, Any]) -> Constraints:
     """Return the constraints of a table; errors are added light by light and key by key."""
     values = {key: value for key, value in table.items() if key in CONSTRAINT_KEYS}
     for key in (key for key in table if key not in values):
-        suggestion = near_key(key, CONSTRAINT_KEYS)
+        suggestion = keys.near_key(key, CONSTRAINT_KEYS)
         hint = (
             f": did you mean {suggestion!r}?"
             if suggestion
@@ -233,7 +228,7 @@ def _constraints(mistakes: Mistakes, label: str, table: Mapping[str, Any]) -> Co
     return Constraints.of(lights, **values)
 
 
-def _is_light(mistakes: Mistakes, label: str, name: str, values: Any) -> bool:
+def _is_light(mistakes: keys.Mistakes, label: str, name: str, values: Any) -> bool:
     """Return whether a light's constraints are valid: each key by itself, then all together."""
     # A Duv alone is incomplete.
     fields = values if isinstance(values, dict) else {}
@@ -244,7 +239,7 @@ def _is_light(mistakes: Mistakes, label: str, name: str, values: Any) -> bool:
     return not invalid_keys and _is_valid(mistakes, label, light={name: values})
 
 
-def _is_valid(mistakes: Mistakes, label: str, **arguments: Any) -> bool:
+def _is_valid(mistakes: keys.Mistakes, label: str, **arguments: Any) -> bool:
     try:
         Constraints.of(**arguments)
     except LightpaintError as error:

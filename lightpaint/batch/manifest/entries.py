@@ -7,31 +7,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.manifest.checks import (
-    BASES,
-    GIVEN_LIGHTING_STEPS,
-    SOLVE_STEPS,
-    check_combination,
-    check_files,
-    check_handover,
-    check_sequence,
-    check_step_tables,
-    constraints_of,
-    files_named,
-    settings_of,
-)
+from lightpaint.batch.manifest import checks, keys
 from lightpaint.batch.manifest.file_names import is_reserved, name_clashes
-from lightpaint.batch.manifest.keys import (
-    LIGHTING_STEPS,
-    MAX_FRAMES,
-    PAINTING_KEYS,
-    SHIFTED_WORDS,
-    SOURCE_KEYS,
-    Final,
-    Handover,
-    Mistakes,
-    Space,
-)
 from lightpaint.batch.manifest.looks_file import Manifest, Table
 from lightpaint.batch.manifest.sequence import frame_position
 from lightpaint.colour import TransformChoice
@@ -65,9 +42,9 @@ class LookEntry:
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
-    want: tuple[str, ...] = SOLVE_STEPS
-    final: Final = field(default_factory=Final)
-    handover: Handover = field(default_factory=Handover)
+    want: tuple[str, ...] = checks.SOLVE_STEPS
+    final: keys.Final = field(default_factory=keys.Final)
+    handover: keys.Handover = field(default_factory=keys.Handover)
     variation: str = ""
     varied_look: str = ""
     shares_places: bool = False
@@ -75,7 +52,7 @@ class LookEntry:
     lighting: str = ""
     combined_looks: tuple[str, ...] = ()
     share: float = 0.0
-    space: Space = "log"
+    space: keys.Space = "log"
 
     @property
     def is_solved(self) -> bool:
@@ -105,10 +82,10 @@ def entries_of(manifest: Manifest) -> LookEntries:
     looks = _looks_of_tables(manifest)
     for table in manifest.sequences:
         looks.complete.extend(_sequence_looks(manifest, looks, table))
-        if len(looks.complete) > MAX_LOOKS + MAX_FRAMES:
+        if len(looks.complete) > MAX_LOOKS + keys.MAX_FRAMES:
             raise BatchError(
-                f"{manifest.path} asks for more than {MAX_LOOKS} looks and {MAX_FRAMES} frames: "
-                "make several batches of it"
+                f"{manifest.path} asks for more than {MAX_LOOKS} looks and {keys.MAX_FRAMES} "
+                "frames: make several batches of it"
             )
     named_entries = [entry for _, entry in looks.incomplete if entry.name]
     _check_names(manifest, [*looks.complete, *named_entries])
@@ -162,7 +139,7 @@ class _Sources:
         self._bases: dict[str, BasisFile | GroupsFile] = {}
 
     def scene(self, look: Mapping[str, Any], sensor: str | int | None) -> SceneFile:
-        values = {key: look[key] for key in SOURCE_KEYS if key in look}
+        values = {key: look[key] for key in keys.SOURCE_KEYS if key in look}
         for key in ("basis", "light_groups", "pattern", "sensors"):
             values.pop(key, None)
         path = str(self._base / values.pop("scene"))
@@ -187,7 +164,7 @@ class _Sources:
             # The folder of light groups may hold paintings and masks as well.
             pictures = [look[key] for key in ("painting", "mask") if key in look]
             pictures += look.get("paintings", [])
-            painted_files = [x for path in pictures for x in files_named(self._base, path)]
+            painted_files = [x for path in pictures for x in checks.files_named(self._base, path)]
             path = str(self._base / look["light_groups"])
             leave_out = tuple(painted_files) if Path(path).is_dir() else ()
             file = GroupsFile(path, look.get("pattern"), leave_out)
@@ -204,16 +181,18 @@ def _table_looks(
     """Return the looks of one table or, if it has mistakes, the part of it that is clear."""
     mistakes, label, look = manifest.mistakes, table.label, table.values
     mistakes_before = len(mistakes.lines)
-    check_combination(mistakes, table)
-    check_files(manifest, table)
-    check_step_tables(mistakes, table)
+    checks.check_combination(mistakes, table)
+    checks.check_files(manifest, table)
+    checks.check_step_tables(mistakes, table)
     is_given = table.has("lighting", "lightings")
     entry = LookEntry(
         look.get("name", ""),
         label,
-        constraints=constraints_of(manifest, label, look),
-        settings=settings_of(manifest, label, look),
-        want=tuple(look.get("want", GIVEN_LIGHTING_STEPS if is_given else SOLVE_STEPS)),
+        constraints=checks.constraints_of(manifest, label, look),
+        settings=checks.settings_of(manifest, label, look),
+        want=tuple(
+            look.get("want", checks.GIVEN_LIGHTING_STEPS if is_given else checks.SOLVE_STEPS)
+        ),
         final=mistakes.final(look.get("render", {}), label),
         handover=mistakes.handover(look.get("export", {}), label, manifest.folder),
         shares_places="share" in look,
@@ -231,7 +210,7 @@ def _table_looks(
         mistakes.add(label, error.sentence)
     example = looks[0] if looks else _partial_entry(manifest, sources, table, entry)
     if "export" in entry.want and (example.scenes or example.basis):
-        check_handover(mistakes, label, entry.handover, example)
+        checks.check_handover(mistakes, label, entry.handover, example)
     for name in {x.name for x in looks} or {entry.name} - {""}:
         if not is_name(name):
             mistakes.add(label, f"{name!r} cannot be the name of a folder: set name = ...")
@@ -246,13 +225,13 @@ def _partial_entry(
     """Return the scenes and the basis of a table with mistakes, as far as they are known."""
     look, base = table.values, manifest.folder
     # Any sensor, or none, will do to check the lights of a scene.
-    if table.unclear_keys & (set(SOURCE_KEYS) - {"sensor", "sensors"}):
+    if table.unclear_keys & (set(keys.SOURCE_KEYS) - {"sensor", "sensors"}):
         return entry
     if "scene" in look and (base / look["scene"]).is_file():
         sensors = [*look.get("views", ()), *look.get("sensors", ())]
         sensors += [look["sensor"]] if "sensor" in look else []
         return replace(entry, scenes=tuple(sources.scene(look, x) for x in sensors or [None]))
-    paths = [look[key] for key in BASES if key in look]
+    paths = [look[key] for key in checks.BASES if key in look]
     if len(paths) == 1 and (base / paths[0]).exists():
         return replace(entry, basis=sources.basis(look))
     return entry
@@ -278,7 +257,7 @@ def _subject_looks(
     patterns = [look[key]] if key in look else look[f"{key}s"]
     is_one = key in look and not has_magic(look[key])
     sensors: Sequence[Any] = look.get("sensors") or [look.get("sensor")]
-    for file in (file for path in patterns for file in files_named(manifest.folder, path)):
+    for file in (file for path in patterns for file in checks.files_named(manifest.folder, path)):
         # Answers are all called lighting.json: their folders tell them apart.
         stem = Path(file).parent.name if Path(file).name == "lighting.json" else Path(file).stem
         name = look.get("name", "")
@@ -294,7 +273,7 @@ def _subject_looks(
 
 
 def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Painting:
-    values = {key: look[key] for key in PAINTING_KEYS if key in look}
+    values = {key: look[key] for key in keys.PAINTING_KEYS if key in look}
     transform = TransformChoice(values.pop("view", None), values.pop("exposure", None))
     if "find_template" in values:
         values["find"] = values.pop("find_template")
@@ -308,7 +287,7 @@ def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
     """Return a variation of a look: solved with other settings, or derived from its answer."""
     name = f"{entry.name}-{word.replace(' ', '-')}"
     variation = replace(entry, name=name, variation=word, varied_look=entry.name)
-    if word not in SHIFTED_WORDS:
+    if word not in keys.SHIFTED_WORDS:
         if not entry.is_solved:
             raise LightpaintError(f"variations has {word!r}, and its lighting is given")
         return variation
@@ -323,7 +302,9 @@ def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
 
 def _lighting_steps(want: Sequence[str]) -> tuple[str, ...]:
     """Return the requested steps that apply to a lighting that is combined from others."""
-    return tuple(step for step in want if step in LIGHTING_STEPS) or GIVEN_LIGHTING_STEPS
+    return (
+        tuple(step for step in want if step in keys.LIGHTING_STEPS) or checks.GIVEN_LIGHTING_STEPS
+    )
 
 
 def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
@@ -331,8 +312,8 @@ def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> lis
     mistakes, label, values = manifest.mistakes, table.label, table.values
     by_name = {look.name: look for look in looks.complete}
     mistakes_before = len(mistakes.lines)
-    check_sequence(mistakes, table)
-    check_step_tables(mistakes, table)
+    checks.check_sequence(mistakes, table)
+    checks.check_step_tables(mistakes, table)
     final = mistakes.final(values.get("render", {}), label)
     handover = mistakes.handover(values.get("export", {}), label, manifest.folder)
     ends = [by_name[name] for name in values.get("through", ()) if name in by_name]
@@ -347,18 +328,18 @@ def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> lis
         or len(ends) < len(values["through"])
     ):
         return []
-    steps = tuple(values.get("want", GIVEN_LIGHTING_STEPS))
+    steps = tuple(values.get("want", checks.GIVEN_LIGHTING_STEPS))
     options: dict[str, Any] = {"want": steps, "final": final, "handover": handover}
     looks_of_frames = [replace(frame, label=label, **options) for frame in _frames(values, ends)]
     if "render" in steps and not ends[0].scenes:
         mistakes.add(label, "want has 'render', which needs the scene of its looks")
     if "export" in steps:
-        check_handover(mistakes, label, handover, looks_of_frames[0])
+        checks.check_handover(mistakes, label, handover, looks_of_frames[0])
     return looks_of_frames
 
 
 def _check_ends(
-    mistakes: Mistakes, label: str, ends: Sequence[LookEntry], values: Mapping[str, Any]
+    mistakes: keys.Mistakes, label: str, ends: Sequence[LookEntry], values: Mapping[str, Any]
 ) -> None:
     """Add reasons why looks cannot be the ends of a sequence to the mistakes."""
     path = values.get("sensors")

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from lightpaint import validation
 from lightpaint.arrays import RGB
 from lightpaint.colour import kelvin_to_rgb, luminance, photometry
 from lightpaint.errors import BatchError, LightpaintError
@@ -23,17 +24,6 @@ from lightpaint.relit import FORMS
 from lightpaint.scene import check_resolution
 from lightpaint.sentences import Datum, Hint, Sentence
 from lightpaint.target import Paint
-from lightpaint.validation import (
-    BRIGHTEST,
-    MAX_LISTED,
-    MAX_SPP,
-    SWITCH,
-    Check,
-    a,
-    checks_of,
-    one_of,
-    whole,
-)
 
 #: Variations that are solved.
 SOLVED_WORDS = ("fewer lights", "white only", "held harder")
@@ -137,7 +127,7 @@ def with_emission(
 
 
 def _texts(value: Any) -> bool:
-    if not (isinstance(value, list) and 0 < len(value) <= MAX_LISTED):
+    if not (isinstance(value, list) and 0 < len(value) <= validation.MAX_LISTED):
         return False
     return all(isinstance(x, str) and x for x in value)
 
@@ -153,10 +143,14 @@ def _is_plain(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < BRIGHTEST
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and abs(value) < validation.BRIGHTEST
+    )
 
 
-def _some_of(words: Iterable[str], *, or_none: bool = False) -> Check:
+def _some_of(words: Iterable[str], *, or_none: bool = False) -> validation.Check:
     """Return the check of a list of some words. or_none: whether it may be empty."""
     allowed_words = tuple(words)
 
@@ -169,13 +163,13 @@ def _some_of(words: Iterable[str], *, or_none: bool = False) -> Check:
     items = {"enum": [*allowed_words]}
     least = 0 if or_none else 1
     schema = {"type": "array", "items": items, "minItems": least, "uniqueItems": True}
-    return Check(is_valid, expectation, schema)
+    return validation.Check(is_valid, expectation, schema)
 
 
-def _texts_by_name(about: str) -> Check:
+def _texts_by_name(about: str) -> validation.Check:
     """Return the check of a table of texts. about: the table."""
     schema = {"type": "object", "additionalProperties": _TEXT_SCHEMA, "minProperties": 1}
-    return Check(_table_of(_is_text), about, schema)
+    return validation.Check(_table_of(_is_text), about, schema)
 
 
 def _is_text(value: Any) -> bool:
@@ -185,31 +179,38 @@ def _is_text(value: Any) -> bool:
 _TEXT_SCHEMA = {"type": "string", "minLength": 1}
 
 
-_TEXTS_SCHEMA = {"type": "array", "items": _TEXT_SCHEMA, "minItems": 1, "maxItems": MAX_LISTED}
+_TEXTS_SCHEMA = {
+    "type": "array",
+    "items": _TEXT_SCHEMA,
+    "minItems": 1,
+    "maxItems": validation.MAX_LISTED,
+}
 
 
-TEXT = Check(_is_text, "a text", _TEXT_SCHEMA)
+TEXT = validation.Check(_is_text, "a text", _TEXT_SCHEMA)
 
 
-TEXTS = Check(_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most', _TEXTS_SCHEMA)
+TEXTS = validation.Check(
+    _texts, f'a list of texts, ["a", "b"], {validation.MAX_LISTED} at most', _TEXTS_SCHEMA
+)
 
 
-TABLE = a(dict, "a table")
+TABLE = validation.a(dict, "a table")
 
 
 #: Keys for loading a scene or its replacement.
-SOURCE_KEYS: dict[str, Check] = {
+SOURCE_KEYS: dict[str, validation.Check] = {
     "scene": TEXT,
     "basis": TEXT,
     "light_groups": TEXT,
     "pattern": TEXT,
-    "sensor": Check(
+    "sensor": validation.Check(
         lambda v: isinstance(v, str | int) and not isinstance(v, bool) and v != "",
         "the id of a sensor, or its index",
         {"anyOf": [_TEXT_SCHEMA, {"type": "integer"}]},
     ),
     "sensors": TEXTS,
-    "parameters": Check(
+    "parameters": validation.Check(
         _table_of(_is_plain),
         "a table of texts and numbers",
         {
@@ -220,14 +221,14 @@ SOURCE_KEYS: dict[str, Check] = {
     ),
     "variant": TEXT,
     "lights": TEXTS,
-    "groups": Check(
+    "groups": validation.Check(
         _table_of(_texts),
         "a table of lists of names",
         {"type": "object", "additionalProperties": _TEXTS_SCHEMA, "minProperties": 1},
     ),
     "lights_file": TEXT,
-    "use_lights_file": SWITCH,
-    "group_alike": SWITCH,
+    "use_lights_file": validation.SWITCH,
+    "group_alike": validation.SWITCH,
     "integrator": TEXT,
     "split": _texts_by_name('a table of sizes, { sky = "16x8" }'),
     "symmetric": TEXTS,
@@ -236,20 +237,20 @@ SOURCE_KEYS: dict[str, Check] = {
 
 
 #: Keys for reading a painting.
-PAINTING_KEYS: dict[str, Check] = {
+PAINTING_KEYS: dict[str, validation.Check] = {
     "mask": TEXT,
     "layer": TEXT,
     "template": TEXT,
-    "find_template": SWITCH,
+    "find_template": validation.SWITCH,
     "view": TEXT,
-    "exposure": Check(_is_number, "a number of stops", {"type": "number"}),
-    "paint": one_of(Paint),
+    "exposure": validation.Check(_is_number, "a number of stops", {"type": "number"}),
+    "paint": validation.one_of(Paint),
 }
 
 
 #: Keys for constraints, settings and steps.
-REQUEST_KEYS: dict[str, Check] = {
-    "constraints": Check(
+REQUEST_KEYS: dict[str, validation.Check] = {
+    "constraints": validation.Check(
         lambda v: isinstance(v, dict) or _is_text(v), "a table, or the path of a lights file"
     ),
     "settings": TABLE,
@@ -257,12 +258,14 @@ REQUEST_KEYS: dict[str, Check] = {
     "render": TABLE,
     "export": TABLE,
     "variations": _some_of(VARIATIONS, or_none=True),
-    "share": Check(lambda v: v in get_args(Share), '"places"', {"enum": [*get_args(Share)]}),
+    "share": validation.Check(
+        lambda v: v in get_args(Share), '"places"', {"enum": [*get_args(Share)]}
+    ),
 }
 
 
 #: Keys of which a look has exactly one.
-SUBJECT_KEYS: dict[str, Check] = {
+SUBJECT_KEYS: dict[str, validation.Check] = {
     "painting": TEXT,
     "paintings": TEXTS,
     "views": _texts_by_name("a table, SENSOR = PAINTING"),
@@ -271,18 +274,18 @@ SUBJECT_KEYS: dict[str, Check] = {
 }
 
 
-DEFAULT_KEYS: dict[str, Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS}
+DEFAULT_KEYS: dict[str, validation.Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS}
 
 
-LOOK_KEYS: dict[str, Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
+LOOK_KEYS: dict[str, validation.Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
 
 
-SEQUENCE_KEYS: dict[str, Check] = {
+SEQUENCE_KEYS: dict[str, validation.Check] = {
     "name": TEXT,
-    "through": Check(_texts, "a list of names of looks", _TEXTS_SCHEMA),
+    "through": validation.Check(_texts, "a list of names of looks", _TEXTS_SCHEMA),
     "sensors": TEXTS,
-    "frames": whole(2, MAX_FRAMES),
-    "space": one_of(Space),
+    "frames": validation.whole(2, MAX_FRAMES),
+    "space": validation.one_of(Space),
     "want": _some_of(LIGHTING_STEPS),
     "render": TABLE,
     "export": TABLE,
@@ -293,7 +296,7 @@ SEQUENCE_KEYS: dict[str, Check] = {
 #: checks.
 SETTINGS = {
     name: check
-    for name, check in checks_of(Settings).items()
+    for name, check in validation.checks_of(Settings).items()
     if name not in ("transform", "command", "force", "verify", "report", "use_cache")
 }
 
@@ -309,7 +312,11 @@ class Final:
     seed: int = 0
 
 
-FINAL_KEYS: dict[str, Check] = {"spp": whole(2, MAX_SPP), "resolution": TEXT, "seed": whole(0)}
+FINAL_KEYS: dict[str, validation.Check] = {
+    "spp": validation.whole(2, validation.MAX_SPP),
+    "resolution": TEXT,
+    "seed": validation.whole(0),
+}
 
 
 @dataclass(frozen=True)
@@ -323,7 +330,7 @@ class Handover:
 #: Forms that looks of a manifest have: none that is of a show.
 HANDOVER_FORMS = [name for name, form in FORMS.items() if not form.needs_rig]
 
-HANDOVER_KEYS: dict[str, Check] = {"to": _some_of(HANDOVER_FORMS), "stage": TEXT}
+HANDOVER_KEYS: dict[str, validation.Check] = {"to": _some_of(HANDOVER_FORMS), "stage": TEXT}
 
 
 @dataclass
@@ -341,7 +348,7 @@ class Mistakes:
             self.lines.append(line)
 
     def check_keys(
-        self, table: Mapping[str, Any], keys: Mapping[str, Check], label: str
+        self, table: Mapping[str, Any], keys: Mapping[str, validation.Check], label: str
     ) -> set[str]:
         """Return the keys of `table` with valid values, and add errors in the others."""
         valid = set()
@@ -363,7 +370,7 @@ class Mistakes:
         return valid
 
     def unclear_keys(
-        self, table: Mapping[str, Any], keys: Mapping[str, Check], valid: Collection[str]
+        self, table: Mapping[str, Any], keys: Mapping[str, validation.Check], valid: Collection[str]
     ) -> frozenset[str]:
         """Return the known keys that misspelt or invalid ones stand for. valid: of `check_keys`."""
         invalid_keys = [key for key in table if key not in valid]

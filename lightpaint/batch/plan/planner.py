@@ -13,27 +13,10 @@ from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.file_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes, as_key, vary
 from lightpaint.batch.manifest.looks_file import Manifest, read_manifest
+from lightpaint.batch.plan import plan_steps
 from lightpaint.batch.plan.journal import Fingerprints, Journal
-from lightpaint.batch.plan.plan_steps import (
-    Cost,
-    PlaceGroup,
-    Plan,
-    PlannedLook,
-    PlanStep,
-    deciding_looks,
-    file_of_group,
-    group_entries,
-    places_of,
-)
+from lightpaint.batch.work import work_items
 from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
-from lightpaint.batch.work.work_items import (
-    EXPORT,
-    Task,
-    answer_task,
-    bases_of,
-    export_task,
-    render_task,
-)
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
@@ -57,7 +40,7 @@ LUX_SPP = 4096
 
 def plan_batch(
     manifest: str | Path, folder: str | Path, *, force: bool = False, command: str = ""
-) -> Plan:
+) -> plan_steps.Plan:
     """Read `manifest` (docs/batch.md), and check all its looks before anything is rendered.
 
     Args:
@@ -86,7 +69,7 @@ def plan_batch(
     cache, remarks = planner.cache, planner.journal.remarks
     groups = tuple(planner.groups.values())
     sources = manifest_.path, folder, looks, planner.costs, names, cache, remarks, groups
-    return Plan(*sources, planner.measurements)
+    return plan_steps.Plan(*sources, planner.measurements)
 
 
 @dataclass(frozen=True)
@@ -121,12 +104,12 @@ class _Planner:
         self._fingerprints = Fingerprints(manifest.folder)
         self._failed_looks: set[str] = set()
         self._looks_with_moves: list[str] = []
-        self.groups: dict[str, PlaceGroup] = {}
-        self.costs: dict[str, Cost] = {}
-        self.measurements: dict[str, Cost] = {}
+        self.groups: dict[str, plan_steps.PlaceGroup] = {}
+        self.costs: dict[str, plan_steps.Cost] = {}
+        self.measurements: dict[str, plan_steps.Cost] = {}
         self._planes: dict[tuple[str, str], PlanesFile] = {}
 
-    def plan_looks(self, entries: Sequence[LookEntry]) -> tuple[PlannedLook, ...]:
+    def plan_looks(self, entries: Sequence[LookEntry]) -> tuple[plan_steps.PlannedLook, ...]:
         """Return the plan of each look, with those whose lights hang at shared places.
 
         Errors in the manifest are added to its mistakes; errors in a look's own files become its
@@ -160,38 +143,41 @@ class _Planner:
         looks = {x.entry.name: x for x in checked if not x.failure}
         entries, files = [x.entry for x in looks.values()], dict[str, str]()
         try:
-            groups = group_entries(entries, self._looks_with_moves)
+            groups = plan_steps.group_entries(entries, self._looks_with_moves)
         except LightpaintError as error:
             self._mistakes.add("", error.sentence)
             return {}
         for group in groups:
-            file = file_of_group(self._folder, group)
+            file = plan_steps.file_of_group(self._folder, group)
             looks_with_files = [
-                (entry, looks[entry.name].source_files) for entry in deciding_looks(group)
+                (entry, looks[entry.name].source_files)
+                for entry in plan_steps.deciding_looks(group)
             ]
             tasks = [
                 self._answer_task(entry, source_files) for entry, source_files in looks_with_files
             ]
             fingerprint = self._fingerprints.places(looks_with_files)
-            self.groups[str(file)] = PlaceGroup(file, tuple(tasks), fingerprint)
+            self.groups[str(file)] = plan_steps.PlaceGroup(file, tuple(tasks), fingerprint)
             files |= {entry.name: str(file) for entry in group}
-        return places_of(entries, files)
+        return plan_steps.places_of(entries, files)
 
-    def _plan_look(self, look: "_CheckedLook", places: str) -> PlannedLook:
+    def _plan_look(self, look: "_CheckedLook", places: str) -> plan_steps.PlannedLook:
         """Return the plan of a look. places: file of its lights' places; "" if none may move."""
         entry, is_possible = look.entry, not look.failure
         if places:
             entry = replace(entry, places=places)
-            for key, old_key in zip(bases_of(entry), bases_of(look.entry), strict=True):
+            for key, old_key in zip(
+                work_items.bases_of(entry), work_items.bases_of(look.entry), strict=True
+            ):
                 if old_key in self.costs:
                     self.costs[key] = self.costs[old_key]
         steps = self._steps(entry, look.source_files, is_possible=is_possible)
         folder = self._folders[entry.name]
-        return PlannedLook(entry, folder, steps, look.failure, look.remarks)
+        return plan_steps.PlannedLook(entry, folder, steps, look.failure, look.remarks)
 
-    def _answer_task(self, entry: LookEntry, source_files: Sequence[Path]) -> Task:
+    def _answer_task(self, entry: LookEntry, source_files: Sequence[Path]) -> work_items.Task:
         options: dict[str, Any] = {"force": self._force, "command": self._command}
-        return answer_task(entry, self._folders, source_files=source_files, **options)
+        return work_items.answer_task(entry, self._folders, source_files=source_files, **options)
 
     def collect_errors(self, entry: LookEntry) -> None:
         """Add all errors of a look that cannot be planned, not only the first."""
@@ -199,7 +185,7 @@ class _Planner:
 
     def _steps(
         self, entry: LookEntry, source_files: Sequence[Path], *, is_possible: bool
-    ) -> tuple[PlanStep, ...]:
+    ) -> tuple[plan_steps.PlanStep, ...]:
         """Return the steps of a look: its answer, and its render and exports if requested."""
         folder = self._folders[entry.name]
         answer = self._answer_task(entry, source_files)
@@ -207,10 +193,10 @@ class _Planner:
         places = "" if group is None else group.fingerprint
         fingerprints = [self._fingerprints.answer(entry, source_files, places)]
         if "render" in entry.want:
-            tasks.append(render_task(answer, entry, folder))
+            tasks.append(work_items.render_task(answer, entry, folder))
             fingerprints.append(self._fingerprints.render(entry))
         if "export" in entry.want:
-            tasks.append(export_task(answer, entry, folder))
+            tasks.append(work_items.export_task(answer, entry, folder))
             fingerprints.append(self._fingerprints.export(entry))
         is_whole = is_possible and pipeline.is_as_written(folder)
         steps = []
@@ -220,8 +206,8 @@ class _Planner:
             # A new answer invalidates its render and exports.
             is_whole = is_whole and is_done
             if task.kind == "export":
-                is_whole = is_whole and pipeline.is_as_written(folder / EXPORT)
-            steps.append(PlanStep(task, fingerprint, is_whole))
+                is_whole = is_whole and pipeline.is_as_written(folder / work_items.EXPORT)
+            steps.append(plan_steps.PlanStep(task, fingerprint, is_whole))
         return tuple(steps)
 
     def _resolve_entry(
@@ -230,7 +216,7 @@ class _Planner:
         """Return the entry with all defaults resolved, the files that it reads, and remarks."""
         scenes = tuple(map(self.cache.scene, entry.scenes))
         # At most one saved basis stays in memory, and only the cache holds it.
-        self.cache.keep_only(bases_of(entry))
+        self.cache.keep_only(work_items.bases_of(entry))
         basis = None if entry.basis is None else self.cache.source(entry.basis.without_content())
         if not entry.is_solved:
             return entry, *self._check_lighting_look(replace(entry, scenes=scenes, basis=basis))
@@ -327,11 +313,11 @@ class _Planner:
         """Store the cost of each basis that has to be obtained. films: one for each basis."""
         if entry.basis is not None:
             return
-        for key, film in zip(bases_of(entry), films, strict=True):
+        for key, film in zip(work_items.bases_of(entry), films, strict=True):
             if film is None or key in self.costs:
                 continue
             spp = settings.basis_spp
-            self.costs[key] = Cost(
+            self.costs[key] = plan_steps.Cost(
                 f"{film.path.name} through {film.sensor_names[film.sensor]}",
                 len(film.lights),
                 film.size,
@@ -340,13 +326,13 @@ class _Planner:
             )
 
 
-def _cost_of_lux(scene: Scene, planes: PlanesFile, settings: pipeline.Settings) -> Cost:
+def _cost_of_lux(scene: Scene, planes: PlanesFile, settings: pipeline.Settings) -> plan_steps.Cost:
     """Return the cost of the illuminance of each light at all points."""
     points = sum(len(plane) for plane in planes.planes)
     error = settings.error or planes.error
     spp = min(max(LUX_SPP * (DEFAULT_ERROR / error) ** 2, FIRST_SPP), MOST_SPP)
     text = f"{planes.path.name} in {scene.path.name}"
-    return Cost(text, len(scene.lights), (1, points), int(spp), 0)
+    return plan_steps.Cost(text, len(scene.lights), (1, points), int(spp), 0)
 
 
 def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:

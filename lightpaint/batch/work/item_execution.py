@@ -12,22 +12,12 @@ from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.basis.render import basis_of_sums, train_guide
 from lightpaint.batch.manifest.keys import Space, as_key, shift
 from lightpaint.batch.manifest.sequence import interpolate
+from lightpaint.batch.work import work_items
 from lightpaint.batch.work.derived_looks import (
     derived_folder,
     dimmer_lights,
     measure_derived,
     publish_derived,
-)
-from lightpaint.batch.work.work_items import (
-    EXPORT,
-    GuideTraining,
-    ItemResult,
-    PartOfBasis,
-    Passes,
-    PathMap,
-    SumsOfRows,
-    Task,
-    WorkItem,
 )
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
@@ -61,12 +51,14 @@ OUT_OF_MEMORY_TEXT = (
 )
 
 
-def run_item(item: WorkItem, cache: WorkerCache, listen: Listener) -> ItemResult:
+def run_item(
+    item: work_items.WorkItem, cache: WorkerCache, listen: Listener
+) -> work_items.ItemResult:
     """Run one item; an error becomes the failure of this item alone, in one line."""
     return attempt(item, lambda: _run(item, cache, listen))
 
 
-def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
+def attempt(item: work_items.WorkItem, work: Callable[[], Any]) -> work_items.ItemResult:
     """Call `work`, which runs `item`, and return its result or its failure."""
     start_s = time.perf_counter()
     failure, disk_full, is_lost, value = "", False, False, None
@@ -82,25 +74,27 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
         failure = f"{type(error).__name__}: {first_line(error)}"
     spent_s = time.perf_counter() - start_s
     failure = one_line(failure, limit=MAX_REASON_LENGTH)
-    return ItemResult(item.name, item.kind, failure, disk_full, is_lost, spent_s, value=value)
+    return work_items.ItemResult(
+        item.name, item.kind, failure, disk_full, is_lost, spent_s, value=value
+    )
 
 
-def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
+def _run(item: work_items.WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     """Run an item; return its value, or None if it writes files instead."""
-    if isinstance(item, GuideTraining):
+    if isinstance(item, work_items.GuideTraining):
         cache.release_renderer()
         return train_guide(cache.film(item.film), item.seed)
-    if isinstance(item, PartOfBasis):
+    if isinstance(item, work_items.PartOfBasis):
         return cache.renderer(item).render(item.part)
-    if isinstance(item, SumsOfRows):
+    if isinstance(item, work_items.SumsOfRows):
         return _sums_of_rows(item, cache)
     if isinstance(item, SharedPlacing):
         cache.release_renderer()
         return _find_shared_places(item, cache, listen)
-    if isinstance(item, Passes):
+    if isinstance(item, work_items.Passes):
         return cache.frame(item).sum(range(item.first, item.last))
     cache.release_renderer()
-    assert isinstance(item, Task)
+    assert isinstance(item, work_items.Task)
     cache.keep_only(item.bases)
     runners = {"answer": _answer, "render": final_render, "export": _export}
     return runners[item.kind](item, cache, listen)
@@ -117,7 +111,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
+def job_fields(task: work_items.Task, cache: WorkerCache) -> dict[str, Any]:
     """Return the fields of the task's job, with scenes and basis shared."""
     fields = pipeline.decode_job(task.job)
     fields["scenes"] = tuple(map(cache.scene, fields["scenes"]))
@@ -126,7 +120,7 @@ def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
     return fields
 
 
-def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
+def _answer(task: work_items.Task, cache: WorkerCache, listen: Listener) -> None:
     fields = job_fields(task, cache)
     former_look_files = task.former_look_files or ("",) * len(task.bases)
     for key, file, former_look_file in zip(task.bases, task.files, former_look_files, strict=True):
@@ -145,7 +139,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
 
 
 def _derive_answer(
-    task: Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
+    task: work_items.Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
 ) -> None:
     """Write an answer derived from others: a lighting unchanged, warmer, or between two."""
     settings: pipeline.Settings = fields["settings"]
@@ -186,7 +180,7 @@ def derive_lighting(
 
 
 def final_render(
-    task: Task,
+    task: work_items.Task,
     cache: WorkerCache,
     listen: Listener,
     render: Callable[[Scene], Estimate] | None = None,
@@ -213,10 +207,10 @@ def final_render(
     )
 
 
-def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
+def _export(task: work_items.Task, cache: WorkerCache, listen: Listener) -> None:
     """Write an answered look's exports for other programs."""
     fields = job_fields(task, cache)
-    lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
+    lighting, folder = Path(task.lightings[0]), fields["folder"] / work_items.EXPORT
     basis_source = fields["basis"]
     source = Source(
         fields["scenes"][0].content if fields["scenes"] else None,
@@ -237,7 +231,7 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
             write_content(stage / name, make())
 
 
-def _sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
+def _sums_of_rows(item: work_items.SumsOfRows, cache: WorkerCache) -> list[Sums]:
     """Return the sums with each painting over some rows.
 
     The images are those that a whole basis has in these rows, to the last bit.
@@ -302,7 +296,7 @@ class SharedPlacing:
     """
 
     name: str
-    tasks: tuple[Task, ...]
+    tasks: tuple[work_items.Task, ...]
     bases: tuple[str, ...]
     files: tuple[str, ...]
     fingerprint: str
@@ -320,7 +314,7 @@ class SharedPlacing:
         """Saved bases."""
         return tuple(file for file in self.files if file)
 
-    def with_paths(self, move: PathMap) -> "SharedPlacing":
+    def with_paths(self, move: work_items.PathMap) -> "SharedPlacing":
         """Return the same item with other paths."""
         return replace(
             self,
@@ -341,7 +335,7 @@ def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listene
     return record_of(placement, looks=looks, made_of=item.fingerprint).to_json()
 
 
-def _unplaced_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
+def _unplaced_fields(task: work_items.Task, cache: WorkerCache) -> dict[str, Any]:
     """Return the fields of a look's job, whose lights are where the scene has them."""
     fields = pipeline.decode_job(task.job)
     return fields | {"scenes": tuple(map(cache.scene, fields["scenes"])), "placement": None}

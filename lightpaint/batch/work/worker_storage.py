@@ -20,14 +20,7 @@ from lightpaint.basis import Basis, read_basis
 from lightpaint.basis.cache import PARTS, folder, is_trusted_owner
 from lightpaint.basis.render import Part, PartRenderer
 from lightpaint.batch.manifest.keys import Final
-from lightpaint.batch.work.work_items import (
-    PaintingOfSums,
-    PartOfBasis,
-    Passes,
-    SceneFilm,
-    SumsOfRows,
-    key_of_basis,
-)
+from lightpaint.batch.work import work_items
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line
 from lightpaint.images import read_estimate
@@ -205,14 +198,14 @@ class WorkerCache:
             look = read_estimate(Path(former_look_file))[0] if former_look_file else None
             self._bases[key] = replace(basis, former=look)
 
-    def film(self, film: SceneFilm) -> Scene:
+    def film(self, film: work_items.SceneFilm) -> Scene:
         """Return the scene on a film."""
         scene = on_film(self.scene(film.scene).content, film.quality, film.resolution)
         if film.places:
             [scene] = read_placement(Path(film.places)).hung_in([scene]).scenes
         return scene.only(film.light_names) if film.light_names else scene
 
-    def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:
+    def renderer(self, item: work_items.PartOfBasis | work_items.SumsOfRows) -> PartRenderer:
         """Return the renderer of a part; it stays loaded until an item of another basis comes."""
         key = repr((item.film.key, item.seed, item.guide_file))
         if not isinstance(self._renderer, PartRenderer) or self._renderer_key != key:
@@ -222,18 +215,18 @@ class WorkerCache:
             self._renderer, self._renderer_key = PartRenderer(scene, item.seed, guide_table), key
         return self._renderer
 
-    def frame(self, item: Passes) -> PassRenderer:
+    def frame(self, item: work_items.Passes) -> PassRenderer:
         """Return the renderer of passes; it stays loaded until another scene's item comes."""
         key = repr((item.relit, item.final, item.observer))
         if not isinstance(self._renderer, PassRenderer) or self._renderer_key != key:
             self.release_renderer()
-            scene = self.film(SceneFilm(item.relit, None, item.final.resolution))
+            scene = self.film(work_items.SceneFilm(item.relit, None, item.final.resolution))
             if item.observer is not None:
                 scene = replace(scene, is_spectral=True, observer=item.observer)
             self._renderer, self._renderer_key = PassRenderer(scene, item.final), key
         return self._renderer
 
-    def target(self, request: PaintingOfSums, size: tuple[int, int]) -> Target:
+    def target(self, request: work_items.PaintingOfSums, size: tuple[int, int]) -> Target:
         """Return a painting at the size of its basis, read once."""
         key = repr((request, size))
         if key not in self._targets:
@@ -251,4 +244,6 @@ class WorkerCache:
     def keep_only(self, keys: Collection[str]) -> None:
         """Release all bases but the bases of these keys."""
         self._bases = {key: basis for key, basis in self._bases.items() if key in keys}
-        self._sources = {k: x for k, x in self._sources.items() if key_of_basis(x) in keys}
+        self._sources = {
+            k: x for k, x in self._sources.items() if work_items.key_of_basis(x) in keys
+        }

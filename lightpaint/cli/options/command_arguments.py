@@ -6,22 +6,9 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lightpaint.cli.options import job_options, source_options
 from lightpaint.cli.options.argument_order import options_but
 from lightpaint.cli.options.console_options import console_of, rig_file, sending_of
-from lightpaint.cli.options.job_options import (
-    constraints_of,
-    folders_of,
-    jobs_of,
-    settings_of,
-    transform_of,
-)
-from lightpaint.cli.options.source_options import (
-    is_of_frames,
-    painted_of,
-    scene_of,
-    scene_to_export,
-    source_of_template,
-)
 from lightpaint.cli.output.documents import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
@@ -34,14 +21,18 @@ if TYPE_CHECKING:
 
 def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
     """Return the keyword arguments of a command's function. words: the options as typed."""
-    values, settings = vars(options), settings_of(options, words)
+    values, settings = vars(options), job_options.settings_of(options, words)
     output = Path(values["output"]) if values.get("output") else None
     match options.command:
         case "lights":
             return _lights_arguments(options, output)
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
-            return {"scene": scene_of(options), "output": output, "settings": settings}
+            return {
+                "scene": source_options.scene_of(options),
+                "output": output,
+                "settings": settings,
+            }
         case "measure":
             return _measure_arguments(options, output or Path("measured"), settings)
         case "template":
@@ -74,16 +65,16 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
             }
         case "plan":
             return {
-                "scene": scene_of(options),
+                "scene": source_options.scene_of(options),
                 "planes": Path(options.planes) if options.planes else None,
                 "output": output,
-                "constraints": constraints_of(options),
+                "constraints": job_options.constraints_of(options),
                 "settings": replace(settings, planes=None),
             }
         case "paint":
             return _paint_arguments(options, settings, words)
         case "relight":
-            scene = scene_of(options, is_to_solve=False)
+            scene = source_options.scene_of(options, is_to_solve=False)
             paths = list(map(Path, options.lightings))
             return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
         case "verify":
@@ -103,7 +94,7 @@ def _lights_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
     """Return the arguments of `lights`."""
     is_drawn = output is not None or not (options.no_sheet or options.as_json)
     return {
-        "scene": scene_of(options),
+        "scene": source_options.scene_of(options),
         "cd_per_unit": options.cd_per_unit,
         "sheet": (output or Path("lights.png")) if is_drawn else None,
         "is_named": output is not None,
@@ -113,9 +104,9 @@ def _lights_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
 
 def _measure_arguments(options: Namespace, output: Path, settings: Settings) -> dict[str, Any]:
     """Return the arguments of `measure`. A lighting says how its lights are grouped."""
-    scene = scene_of(options)
+    scene = source_options.scene_of(options)
     if options.lighting:
-        scene = scene_of(options, is_to_solve=False)
+        scene = source_options.scene_of(options, is_to_solve=False)
     return {
         "scene": scene,
         "planes": Path(options.planes) if options.planes else None,
@@ -127,9 +118,9 @@ def _measure_arguments(options: Namespace, output: Path, settings: Settings) -> 
 
 def _template_arguments(options: Namespace, output: Path, settings: Settings) -> dict[str, Any]:
     """Return the arguments of `template`."""
-    transform = transform_of(options)
+    transform = job_options.transform_of(options)
     return {
-        "source": source_of_template(options),
+        "source": source_options.source_of_template(options),
         "output": output,
         "transform": None if transform.is_open else transform.over(None),
         "settings": settings,
@@ -145,7 +136,7 @@ def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
         "rig": rig_file(options),
         "fade_s": options.fade_s,
         "positions": options.positions,
-        "scene": scene_to_export(options),
+        "scene": source_options.scene_to_export(options),
         "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
         "stage": Path(options.stage) if options.stage else None,
         "output": output,
@@ -182,8 +173,10 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
     }
     if options.frames is not None:
         arguments["frames"] = options.frames
-    if is_of_frames(options) or (len(options.targets) <= 1 and not options.variations):
-        return {"jobs": jobs_of(options, settings), **arguments}
+    if source_options.is_of_frames(options) or (
+        len(options.targets) <= 1 and not options.variations
+    ):
+        return {"jobs": job_options.jobs_of(options, settings), **arguments}
 
     # Imported late: a single look needs no gallery.
     from lightpaint.batch import parse_variations
@@ -191,7 +184,7 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
 
     failures: dict[str, str] = {}
     jobs, set_of_looks = look_set(
-        jobs_of(options, settings, failures),
+        job_options.jobs_of(options, settings, failures),
         parse_variations(options.variations),
         failures,
         output=Path(options.output) if options.output else None,
@@ -233,12 +226,12 @@ def _paint_arguments(
     options: Namespace, settings: Settings, words: Sequence[str]
 ) -> dict[str, Any]:
     """Return the arguments of `paint`."""
-    sources, constraints = painted_of(options), constraints_of(options)
+    sources, constraints = source_options.painted_of(options), job_options.constraints_of(options)
     source = sources[0]
     if options.lights_file and not isinstance(source, SceneFile):
         constraints = read_constraints(options.lights_file).and_then(constraints)
     session_name = f"{scene_name(Path(source.path))}.paint"
-    [folder] = folders_of(options.output and Path(options.output), [session_name])
+    [folder] = job_options.folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
     excluded = ["output", "new", "layers", "host", "port", "with_browser", "view", "exposure"]
     excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority", "positions"]
@@ -249,7 +242,7 @@ def _paint_arguments(
         "folder": folder,
         "settings": settings,
         "constraints": constraints,
-        "choice": transform_of(options),
+        "choice": job_options.transform_of(options),
         "options": options_but(options.parser, words[words.index("paint") + 1 :], *excluded),
         "layers": None if options.layers is None else Path(options.layers),
         "new": options.new,

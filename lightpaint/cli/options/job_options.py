@@ -7,15 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.basis import FrameSequence
-from lightpaint.cli.options.source_options import (
-    basis_of,
-    groups_of_frames,
-    masks_by_frame,
-    name_without_frame,
-    paintings_by_frame,
-    scene_of,
-    sequence_of,
-)
+from lightpaint.cli.options import source_options
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
 from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
@@ -54,9 +46,9 @@ def jobs_of(
     # Imported late: jobs import much that other commands do not need.
     from lightpaint.pipeline import Job
 
-    if (sequence := sequence_of(options)) is not None:
+    if (sequence := source_options.sequence_of(options)) is not None:
         return [_job_of_frames(options, settings, sequence)]
-    basis = basis_of(options)
+    basis = source_options.basis_of(options)
     if options.views and options.targets:
         raise TargetError("TARGET and --target at once: give every painting with its sensor")
     paths = options.targets or [path for _, path in options.views]
@@ -80,7 +72,7 @@ def jobs_of(
         }
         return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **job_fields)]
     # One scene, loaded once for all jobs.
-    source = () if basis is not None else (scene_of(options),)
+    source = () if basis is not None else (source_options.scene_of(options),)
     jobs = []
     for painting, folder in zip(paintings, _folders_of_looks(options, paths), strict=True):
         try:
@@ -111,19 +103,21 @@ def _job_of_frames(options: Namespace, settings: Settings, sequence: FrameSequen
 
     if options.variations:
         raise LightpaintError("--variations are of one picture: give one frame, or leave them out")
-    paintings = paintings_by_frame(options, sequence)
+    paintings = source_options.paintings_by_frame(options, sequence)
     paths, frames = list(paintings.values()), tuple(paintings)
-    options.masks = masks_by_frame(options, frames)
+    options.masks = source_options.masks_by_frame(options, frames)
     constraints = constraints_of(options)
     if options.lights_file:
         constraints = read_constraints(options.lights_file).and_then(constraints)
     given = (options.targets or paths)[0]
-    [folder] = folders_of(options.output and Path(options.output), [name_without_frame(given)])
+    [folder] = folders_of(
+        options.output and Path(options.output), [source_options.name_without_frame(given)]
+    )
     job = Job(
         (),
         tuple(_paintings_of(options, paths)),
         folder,
-        groups_of_frames(options, sequence, frames),
+        source_options.groups_of_frames(options, sequence, frames),
         constraints,
         settings,
         rigging=rigging_of(options),
@@ -139,7 +133,7 @@ def _scenes_of_views(options: Namespace) -> tuple[SceneFile, ...]:
     """Return the scene through the sensor of each view. Raises TargetError for an option -s."""
     if options.sensor:
         raise TargetError("-s cannot be used with --target, which names the sensors")
-    return tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
+    return tuple(source_options.scene_of(options, sensor=sensor) for sensor, _ in options.views)
 
 
 def _folder_of_views(options: Namespace, paths: Sequence[str]) -> Path:

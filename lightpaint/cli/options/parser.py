@@ -4,48 +4,8 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lightpaint.cli.options import arguments
-from lightpaint.cli.options.answer_options import (
-    add_batch,
-    add_constraints,
-    add_fit,
-    add_frames,
-    add_method,
-    add_paintings,
-    add_pattern,
-    add_rigging,
-    add_several,
-    add_tolerances,
-    add_variations,
-    add_verification,
-)
+from lightpaint.cli.options import answer_options, arguments, console_options, option_groups
 from lightpaint.cli.options.argument_order import CommandParser, Parser
-from lightpaint.cli.options.console_options import (
-    add_console,
-    add_fade,
-    add_listen,
-    add_positions,
-    add_rig,
-    add_send,
-)
-from lightpaint.cli.options.option_groups import (
-    add_budget,
-    add_cache,
-    add_fields,
-    add_lights,
-    add_luminaires,
-    add_map_size,
-    add_output,
-    add_output_mode,
-    add_rig_reading,
-    add_sampling,
-    add_scene,
-    add_server,
-    add_split,
-    add_variant,
-    add_view,
-    add_view_transform,
-)
 from lightpaint.pipeline import Settings
 from lightpaint.validation import parse_share
 from lightpaint.version import __version__
@@ -89,17 +49,19 @@ def command_parser() -> argparse.ArgumentParser:
             name, help=summary, description=description, epilog=EXIT_CODES
         )
         command.add_options(options)
-        add_output_mode(options)
+        option_groups.add_output_mode(options)
     return parser
 
 
 def _lights(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
-    add_lights(parser)
-    add_split(parser)
-    add_fields(parser, Settings, "cd_per_unit")
+    option_groups.add_scene(parser)
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    option_groups.add_fields(parser, Settings, "cd_per_unit")
     output_group = parser.add_mutually_exclusive_group()
-    add_output(output_group, "F.png", "picture of each light alone (default: lights.png)")
+    option_groups.add_output(
+        output_group, "F.png", "picture of each light alone (default: lights.png)"
+    )
     output_group.add_argument(
         "--no-sheet",
         action="store_true",
@@ -113,16 +75,16 @@ def _lights(parser: argparse.ArgumentParser) -> None:
 
 
 def _basis(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
-    add_lights(parser)
-    add_split(parser)
-    add_budget(parser)
-    add_cache(parser)
-    add_output(parser, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
+    option_groups.add_scene(parser)
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    option_groups.add_budget(parser)
+    option_groups.add_cache(parser)
+    option_groups.add_output(parser, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
 
 
 def _measure(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
+    option_groups.add_scene(parser)
     parser.add_argument(
         "--planes",
         metavar="F.toml",
@@ -133,14 +95,14 @@ def _measure(parser: argparse.ArgumentParser) -> None:
         metavar="lighting.json",
         help="file that solve wrote: measure with its lights (default: as the scene has them)",
     )
-    add_lights(parser)
-    add_split(parser)
-    add_fields(parser, Settings, "cd_per_unit", default="as in the lights file")
-    add_fields(parser, Settings, "spp", default="as many as --error needs")
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    option_groups.add_fields(parser, Settings, "cd_per_unit", default="as in the lights file")
+    option_groups.add_fields(parser, Settings, "spp", default="as many as --error needs")
     _add_measuring_error(parser)
-    add_fields(parser, Settings, "seed", "use_cache")
-    add_output(parser, "DIR", "folder for tables and pictures (default: measured/)")
-    add_fields(parser, Settings, "force")
+    option_groups.add_fields(parser, Settings, "seed", "use_cache")
+    option_groups.add_output(parser, "DIR", "folder for tables and pictures (default: measured/)")
+    option_groups.add_fields(parser, Settings, "force")
 
 
 def _add_measuring_error(parser: argparse.ArgumentParser) -> None:
@@ -161,15 +123,15 @@ def _template(parser: argparse.ArgumentParser) -> None:
         help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder "
         "of them (--lights may name light groups, too)",
     )
-    add_view(parser)
-    add_lights(parser)
-    add_split(parser)
-    add_pattern(parser)
-    add_budget(parser)
-    add_fields(parser, Settings, "spectral", "observer")
-    add_cache(parser)
-    add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
-    add_output(
+    option_groups.add_view(parser)
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    answer_options.add_pattern(parser)
+    option_groups.add_budget(parser)
+    option_groups.add_fields(parser, Settings, "spectral", "observer")
+    option_groups.add_cache(parser)
+    option_groups.add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
+    option_groups.add_output(
         parser, "DIR|F.exr", "folder to write, or a single EXR with its PNG (default: template/)"
     )
     parser.add_argument(
@@ -178,9 +140,11 @@ def _template(parser: argparse.ArgumentParser) -> None:
 
 
 def _demo(parser: argparse.ArgumentParser) -> None:
-    add_output(parser, "DIR", "folder for scene, painting and result (default: lightpaint-demo/)")
-    add_fields(parser, Settings, "spp")
-    add_variant(parser)
+    option_groups.add_output(
+        parser, "DIR", "folder for scene, painting and result (default: lightpaint-demo/)"
+    )
+    option_groups.add_fields(parser, Settings, "spp")
+    option_groups.add_variant(parser)
 
 
 def _solve(parser: argparse.ArgumentParser) -> None:
@@ -190,9 +154,9 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR, a folder of "
         "them, or the frames of a shot, 'shot.####.exr'",
     )
-    add_paintings(parser)
-    add_output(parser, "DIR", "result folder (default: named after the target)")
-    add_fields(parser, Settings, "force")
+    answer_options.add_paintings(parser)
+    option_groups.add_output(parser, "DIR", "result folder (default: named after the target)")
+    option_groups.add_fields(parser, Settings, "force")
     parser.add_argument(
         "--table",
         choices=("short", "full"),
@@ -200,24 +164,24 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         help="short: stops and colours, of many lights only the important ones; full: all lights, "
         "with radiometric units and uncertainties (default: %(default)s)",
     )
-    add_several(parser)
-    add_variations(parser)
-    add_frames(parser)
-    add_method(parser)
-    add_verification(parser)
-    add_fields(parser, Settings, "report")
-    add_tolerances(parser)
-    add_fields(parser, Settings, "cd_per_unit", "planes", "watts", "ignore_wishes")
-    add_lights(parser)
-    add_split(parser)
-    add_map_size(parser)
-    add_pattern(parser)
-    add_constraints(parser)
-    add_rigging(parser)
-    add_budget(parser)
-    add_fields(parser, Settings, "error")
-    add_cache(parser)
-    add_view(parser)
+    answer_options.add_several(parser)
+    answer_options.add_variations(parser)
+    answer_options.add_frames(parser)
+    answer_options.add_method(parser)
+    answer_options.add_verification(parser)
+    option_groups.add_fields(parser, Settings, "report")
+    answer_options.add_tolerances(parser)
+    option_groups.add_fields(parser, Settings, "cd_per_unit", "planes", "watts", "ignore_wishes")
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    option_groups.add_map_size(parser)
+    answer_options.add_pattern(parser)
+    answer_options.add_constraints(parser)
+    answer_options.add_rigging(parser)
+    option_groups.add_budget(parser)
+    option_groups.add_fields(parser, Settings, "error")
+    option_groups.add_cache(parser)
+    option_groups.add_view(parser)
 
 
 def _paint(parser: argparse.ArgumentParser) -> None:
@@ -228,23 +192,25 @@ def _paint(parser: argparse.ArgumentParser) -> None:
         help="scene XML, a *.basis.exr (or several, one per view of a scene), or light groups of "
         "another renderer (--lights may name light groups, too)",
     )
-    add_output(
+    option_groups.add_output(
         parser,
         "DIR",
         "folder for session and exports (default: named after the scene)",
     )
-    add_server(parser)
-    add_console(parser)
-    add_fit(parser)
-    add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
-    add_lights(parser)
-    add_split(parser)
-    add_pattern(parser)
-    add_constraints(parser)
-    add_budget(parser)
-    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral", "observer")
-    add_cache(parser)
-    add_view(parser, is_repeatable=True)
+    option_groups.add_server(parser)
+    console_options.add_console(parser)
+    answer_options.add_fit(parser)
+    option_groups.add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    answer_options.add_pattern(parser)
+    answer_options.add_constraints(parser)
+    option_groups.add_budget(parser)
+    option_groups.add_fields(
+        parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral", "observer"
+    )
+    option_groups.add_cache(parser)
+    option_groups.add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.
     parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
@@ -275,7 +241,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
     source_group.add_argument(
         "--scene", metavar="SCENE.xml", help="scene that the lighting was solved for"
     )
-    add_luminaires(parser)
+    option_groups.add_luminaires(parser)
     source_group.add_argument(
         "--lights",
         dest="groups",
@@ -283,20 +249,22 @@ def _export(parser: argparse.ArgumentParser) -> None:
         help="light groups of another renderer that the lighting was solved from: an EXR, a folder "
         "of them, or the frames of a shot",
     )
-    add_pattern(parser)
+    answer_options.add_pattern(parser)
     parser.add_argument(
         "--stage",
         metavar="FILE.usd",
         help="for usd: stage whose lights the layer overrides, found by their names in the scene "
         "(default: new prims below /lights)",
     )
-    add_rig(parser, required=False, purpose="for mvr and cues: ")
-    add_fade(parser, "for cues: the time of each (default: none)")
-    add_positions(parser, purpose="for cues: ")
-    add_map_size(parser)
-    add_view(parser)
-    add_output(parser, "DIR", "folder for the files (default: the folder of lighting.json)")
-    add_fields(parser, Settings, "force")
+    console_options.add_rig(parser, required=False, purpose="for mvr and cues: ")
+    console_options.add_fade(parser, "for cues: the time of each (default: none)")
+    console_options.add_positions(parser, purpose="for cues: ")
+    option_groups.add_map_size(parser)
+    option_groups.add_view(parser)
+    option_groups.add_output(
+        parser, "DIR", "folder for the files (default: the folder of lighting.json)"
+    )
+    option_groups.add_fields(parser, Settings, "force")
 
 
 def _rig(parser: argparse.ArgumentParser) -> None:
@@ -322,8 +290,8 @@ def _rig(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="leave colour wheels open (default: the solve chooses their slots)",
     )
-    add_rig_reading(parser, has_zoom=True)
-    add_output(
+    option_groups.add_rig_reading(parser, has_zoom=True)
+    option_groups.add_output(
         parser,
         "F.xml",
         "scene to write, with its lights file and meshes beside it (default: named after the show)",
@@ -334,7 +302,7 @@ def _rig(parser: argparse.ArgumentParser) -> None:
 
 
 def _blender(parser: argparse.ArgumentParser) -> None:
-    add_output(parser, "F.zip", "file to write (default: lightpaint-blender.zip)")
+    option_groups.add_output(parser, "F.zip", "file to write (default: lightpaint-blender.zip)")
     parser.add_argument(
         "--force",
         action="store_true",
@@ -343,19 +311,21 @@ def _blender(parser: argparse.ArgumentParser) -> None:
 
 
 def _relight(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
+    option_groups.add_scene(parser)
     parser.add_argument(
         "lightings", metavar="lighting.json", nargs="+", help="files that solve wrote"
     )
-    add_luminaires(parser)
-    add_sampling(parser)
-    add_map_size(parser)
-    add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
-    add_fields(parser, Settings, "force")
+    option_groups.add_luminaires(parser)
+    option_groups.add_sampling(parser)
+    option_groups.add_map_size(parser)
+    option_groups.add_output(
+        parser, "DIR", "result folder (default: named after the lighting's target)"
+    )
+    option_groups.add_fields(parser, Settings, "force")
 
 
 def _plan(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
+    option_groups.add_scene(parser)
     parser.add_argument(
         "--planes",
         metavar="FILE",
@@ -368,21 +338,21 @@ def _plan(parser: argparse.ArgumentParser) -> None:
         default="watts",
         help="what to save where wishes can be met in several ways (default: %(default)s)",
     )
-    add_lights(parser)
-    add_split(parser)
-    add_constraints(parser)
-    add_fields(parser, Settings, "watts")
+    option_groups.add_lights(parser)
+    option_groups.add_split(parser)
+    answer_options.add_constraints(parser)
+    option_groups.add_fields(parser, Settings, "watts")
     _add_measuring_error(parser)
-    add_fields(parser, Settings, "seed", "cd_per_unit")
-    add_cache(parser)
-    add_output(parser, "DIR", "result folder (default: named after the scene)")
-    add_fields(parser, Settings, "force")
+    option_groups.add_fields(parser, Settings, "seed", "cd_per_unit")
+    option_groups.add_cache(parser)
+    option_groups.add_output(parser, "DIR", "result folder (default: named after the scene)")
+    option_groups.add_fields(parser, Settings, "force")
 
 
 def _verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
-    add_sampling(parser, default="the basis's")
-    add_variant(parser)
+    option_groups.add_sampling(parser, default="the basis's")
+    option_groups.add_variant(parser)
 
 
 def _cache(parser: argparse.ArgumentParser) -> None:
@@ -437,7 +407,7 @@ COMMANDS = {
     ),
     "batch": Command(
         "solve many looks from one manifest; a stopped batch continues",
-        add_batch,
+        answer_options.add_batch,
         "batch_command",
         "batch",
     ),
@@ -452,13 +422,13 @@ COMMANDS = {
     ),
     "send": Command(
         "send the levels of a lighting to a console, or print them",
-        add_send,
+        console_options.add_send,
         "console_commands",
         "stage",
     ),
     "listen": Command(
         "print the levels that arrive from a console or from send",
-        add_listen,
+        console_options.add_listen,
         "console_commands",
         "stage",
     ),
@@ -482,7 +452,7 @@ COMMANDS = {
     ),
     "doctor": Command(
         "check what works on this machine and what to install",
-        add_variant,
+        option_groups.add_variant,
         "program_commands",
         "install",
     ),

@@ -26,16 +26,7 @@ from lightpaint.colour import (
     xy_of,
 )
 from lightpaint.dmx.console_rig import RigSlot
-from lightpaint.dmx.gdtf.emitter_colour import (
-    Chromaticity,
-    EmitterColour,
-    bounded,
-    filter_spectrum,
-    parsed_colour,
-    possible_kelvin,
-    rgb_of_xy,
-    xy_of_kelvin,
-)
+from lightpaint.dmx.gdtf import emitter_colour
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, ModeChannel, dmx_value
 
 #: What stands between the names of two slots that share the beam.
@@ -62,7 +53,7 @@ class SlotColour:
     """
 
     slot: RigSlot
-    colour: EmitterColour
+    colour: emitter_colour.EmitterColour
 
 
 @dataclass(frozen=True)
@@ -111,7 +102,7 @@ class SlotCombination:
     """
 
     slots: tuple[RigSlot, ...]
-    colour: EmitterColour
+    colour: emitter_colour.EmitterColour
     filter: SlotFilter
 
 
@@ -154,7 +145,7 @@ def _combined(
         for x, k, own in zip(chosen, places, opens, strict=True)
         if k != own or x.colour.share < CLEAR
     ]
-    lamp = _bt2020(xy_of_kelvin(kelvin))
+    lamp = _bt2020(emitter_colour.xy_of_kelvin(kelvin))
     passed = np.ones(3)
     for x in others:
         passed = passed * np.clip(x.colour.share * _bt2020(x.colour.xy) / lamp, 0, 1)
@@ -164,7 +155,9 @@ def _combined(
     else:
         xyz = rgb_to_xyz(REC2020) @ (np.maximum(passed, OPAQUE) * lamp)
         name = " + ".join(x.colour.name for x in others)
-        colour = EmitterColour(name, bounded(xy_of(xyz)), float(xyz[1]))
+        colour = emitter_colour.EmitterColour(
+            name, emitter_colour.bounded(xy_of(xyz)), float(xyz[1])
+        )
     return SlotCombination(slots, colour, SlotFilter(colour.name, as_rgb(passed.round(4))))
 
 
@@ -174,8 +167,8 @@ def _is_new(found: SlotCombination, brighter: Sequence[SlotCombination]) -> bool
     """
     if found.colour.share < DARKEST:
         return False
-    looks = lab_of_lights(np.array([rgb_of_xy(x.colour.xy) for x in brighter]))
-    own = lab_of_lights(rgb_of_xy(found.colour.xy))
+    looks = lab_of_lights(np.array([emitter_colour.rgb_of_xy(x.colour.xy) for x in brighter]))
+    own = lab_of_lights(emitter_colour.rgb_of_xy(found.colour.xy))
     bright = np.array([x.colour.share >= found.colour.share for x in brighter])
     return not (bright & (ciede2000(looks, own) < ALIKE)).any()
 
@@ -192,7 +185,7 @@ def _with_own_names(found: Sequence[SlotCombination]) -> list[SlotCombination]:
     return named
 
 
-def _bt2020(xy: Chromaticity) -> Doubles:
+def _bt2020(xy: emitter_colour.Chromaticity) -> Doubles:
     """Return the linear BT.2020 colour (3,) of luminance 1."""
     return np.asarray(np.linalg.solve(rgb_to_xyz(REC2020), _xyz(xy)))
 
@@ -261,22 +254,22 @@ def _free_name(element: Element, number: int, used: set[str]) -> str:
 
 def _colour(
     name: str, element: Element, filters: Sequence[Element], kelvin: float
-) -> EmitterColour:
+) -> emitter_colour.EmitterColour:
     """Return the light of a lamp behind a slot: by the measured transmission of its filter, or else
     by the colour that the file gives it or the filter.
     """
-    kelvin = possible_kelvin(kelvin)
+    kelvin = emitter_colour.possible_kelvin(kelvin)
     linked = next((x for x in filters if x.get("Name") == element.get("Filter")), None)
-    if linked is not None and (measured := filter_spectrum(linked)) is not None:
+    if linked is not None and (measured := emitter_colour.filter_spectrum(linked)) is not None:
         waves, transmission, level = measured
         xyz = _light_through(waves, transmission, kelvin)
         if xyz[1] > 0:
-            return EmitterColour(name, bounded(xy_of(xyz)), level)
-    colour = parsed_colour(element.get("Color"))
+            return emitter_colour.EmitterColour(name, emitter_colour.bounded(xy_of(xyz)), level)
+    colour = emitter_colour.parsed_colour(element.get("Color"))
     if linked is not None and element.get("Color") is None:
-        colour = parsed_colour(linked.get("Color"))
+        colour = emitter_colour.parsed_colour(linked.get("Color"))
     if colour is None:
-        return EmitterColour(name, xy_of_kelvin(kelvin), 1.0)
+        return emitter_colour.EmitterColour(name, emitter_colour.xy_of_kelvin(kelvin), 1.0)
     return _filtered(name, *colour, kelvin)
 
 
@@ -290,19 +283,23 @@ def _light_through(nanometres: Doubles, transmission: Doubles, kelvin: float) ->
     return np.asarray((passed * black_body) @ observer)
 
 
-def _filtered(name: str, xy: Chromaticity, percent: float, kelvin: float) -> EmitterColour:
+def _filtered(
+    name: str, xy: emitter_colour.Chromaticity, percent: float, kelvin: float
+) -> emitter_colour.EmitterColour:
     """Return the light of a lamp behind a filter, whose colour, as under D65, has a Y of so many
     percent of the light; of 0, as bright as a filter of this colour can be.
 
     It lets red, green and blue of BT.2020, between which filters' colours lie, through in
     proportion.
     """
-    passed, lamp = np.clip(_bt2020(xy), 0, None), _bt2020(xy_of_kelvin(kelvin))
+    passed, lamp = np.clip(_bt2020(xy), 0, None), _bt2020(emitter_colour.xy_of_kelvin(kelvin))
     most = 1 / float(passed.max())
     level = min(percent / 100, most) if percent > 0 else most
-    return EmitterColour(name, bounded(xy_of(rgb_to_xyz(REC2020) @ (passed * lamp))), level)
+    return emitter_colour.EmitterColour(
+        name, emitter_colour.bounded(xy_of(rgb_to_xyz(REC2020) @ (passed * lamp))), level
+    )
 
 
-def _xyz(xy: Chromaticity) -> Doubles:
+def _xyz(xy: emitter_colour.Chromaticity) -> Doubles:
     x, y = xy
     return np.array([x / y, 1.0, (1 - x - y) / y])

@@ -17,6 +17,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour import solid_angle
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
+from lightpaint.dmx.gdtf import mode_channels
 from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
     SPACES,
@@ -31,15 +32,6 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.geometry_tree import Placed
-from lightpaint.dmx.gdtf.mode_channels import (
-    ChannelFunction,
-    Curve,
-    ModeChannel,
-    ModeHead,
-    curve_of,
-    mode_heads,
-    shutter_levels,
-)
 from lightpaint.dmx.levels import can_invert
 from lightpaint.sentences import Hint, Sentence
 
@@ -115,7 +107,7 @@ class FixtureMode:
     lights: tuple[ModeLight, ...]
     emission: str
     remarks: tuple[str, ...] = ()
-    heads: tuple[ModeHead, ...] = ()
+    heads: tuple[mode_channels.ModeHead, ...] = ()
     lacking: tuple[str, ...] = ()
 
 
@@ -155,7 +147,7 @@ class ModeReader:
         self,
         name: str,
         tree: Sequence[Placed],
-        channels: Sequence[ModeChannel],
+        channels: Sequence[mode_channels.ModeChannel],
         elements: Callable[[str], list[Element]],
         wheels: Sequence[Element] = (),
         *,
@@ -171,7 +163,7 @@ class ModeReader:
         # These are asked for each beam, of which there may be hundreds.
         self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
         self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
-        levels, remarks = shutter_levels(self.channels)
+        levels, remarks = mode_channels.shutter_levels(self.channels)
         for k, level in levels.items():
             self.dmx[k] = replace(self.dmx[k], default=level)
         for remark in remarks:
@@ -205,7 +197,7 @@ class ModeReader:
         if not lights:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
-        heads = mode_heads(self.tree, self.channels, beams)
+        heads = mode_channels.mode_heads(self.tree, self.channels, beams)
         known = tuple(self.remarks), heads, tuple(dict.fromkeys(self.lacking))
         return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, *known)
 
@@ -382,7 +374,7 @@ class ModeReader:
         curve = self.dmx[place].curve
         return round((curve[-1][0] if curve else 1.0) * self.dmx[place].highest)
 
-    def _set_curve(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
+    def _set_curve(self, place: int, pattern: re.Pattern[str]) -> mode_channels.ChannelFunction:
         """Set the curve of a channel to the curve of its function, and return the function."""
         channel = self.channels[place]
         function = next(
@@ -391,7 +383,7 @@ class ModeReader:
             if pattern.fullmatch(x.attribute)
         )
         assert function is not None
-        curve = curve_of(function, self.dmx[place].highest, self.profiles)
+        curve = mode_channels.curve_of(function, self.dmx[place].highest, self.profiles)
         self.dmx[place] = replace(self.dmx[place], curve=curve)
         return function
 
@@ -501,14 +493,14 @@ class ModeReader:
             if function is not None and is_range and above:
                 levels = (function.first, function.last)
                 pairs = zip(levels, function.ends, strict=True)
-                curve: Curve = tuple(
+                curve: mode_channels.Curve = tuple(
                     sorted(((n / self.dmx[k].highest, x) for n, x in pairs), key=lambda p: p[1])
                 )
                 self.dmx[k] = replace(self.dmx[k], curve=curve)
                 return [k]
         return []
 
-    def _warmth_of(self, place: int) -> ChannelFunction | None:
+    def _warmth_of(self, place: int) -> mode_channels.ChannelFunction | None:
         """Return the function by which a channel sets a colour temperature."""
         channel = self.channels[place]
         found = (channel.function(x.attribute) for x in channel.functions)
@@ -566,7 +558,9 @@ class ModeReader:
             for k in found[letter]:
                 function = self._shape(k, _XY)
                 ends = zip((function.first, function.last), function.physical, strict=True)
-                curve: Curve = tuple((level / self.dmx[k].highest, x) for level, x in ends)
+                curve: mode_channels.Curve = tuple(
+                    (level / self.dmx[k].highest, x) for level, x in ends
+                )
                 self.dmx[k] = replace(self.dmx[k], curve=curve)
         return found["X"][0], found["Y"][0]
 

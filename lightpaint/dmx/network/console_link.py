@@ -15,13 +15,7 @@ from typing import Protocol, Self
 
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import DriveFade, RigDrives, check_drives, encode_levels
-from lightpaint.dmx.network.console_target import (
-    SACN,
-    ConsoleTarget,
-    DmxProtocol,
-    network_universes,
-    parse_target,
-)
+from lightpaint.dmx.network import console_target
 from lightpaint.errors import ConsoleError
 
 #: Packets with the same levels before a universe falls silent.
@@ -100,7 +94,7 @@ class ConsoleLink:
 
     def __init__(
         self,
-        target: ConsoleTarget,
+        target: console_target.ConsoleTarget,
         rig: ConsoleRig,
         output: LevelOutput,
         universes: Mapping[int, int],
@@ -125,7 +119,7 @@ class ConsoleLink:
     @classmethod
     def open(
         cls,
-        target: ConsoleTarget | str,
+        target: console_target.ConsoleTarget | str,
         rig: ConsoleRig,
         *,
         universes: Mapping[int, int] | None = None,
@@ -140,8 +134,8 @@ class ConsoleLink:
         machine to send from, "" for any. Raises ConsoleError for a host, a universe or an interface
         that does not exist, and without the library of the protocol.
         """
-        target = parse_target(target) if isinstance(target, str) else target
-        numbers = network_universes(rig, target.protocol, universes)
+        target = console_target.parse_target(target) if isinstance(target, str) else target
+        numbers = console_target.network_universes(rig, target.protocol, universes)
         if not numbers:
             raise ConsoleError(f"{rig.name} has no channel: there is nothing to send")
         if not 0 <= priority <= MAX_PRIORITY:
@@ -278,7 +272,7 @@ class ConsoleLink:
 
 
 def link_address(
-    target: ConsoleTarget,
+    target: console_target.ConsoleTarget,
     rig: ConsoleRig,
     *,
     universes: Mapping[int, int] | None = None,
@@ -286,34 +280,40 @@ def link_address(
 ) -> str:
     """Return `ConsoleLink.address` of a link that is not open. Raises as `ConsoleLink.open`."""
     check_library(target.protocol)
-    numbers = network_universes(rig, target.protocol, universes)
+    numbers = console_target.network_universes(rig, target.protocol, universes)
     return _address_of(target, numbers.values(), priority)
 
 
-def _address_of(target: ConsoleTarget, universes: Collection[int], priority: int) -> str:
+def _address_of(
+    target: console_target.ConsoleTarget, universes: Collection[int], priority: int
+) -> str:
     plural = "s" if len(universes) > 1 else ""
     text = f"{target}, universe{plural} {', '.join(map(str, universes))}"
-    if target.protocol is not SACN:
+    if target.protocol is not console_target.SACN:
         return text
     return f"{text}, source {SOURCE_NAME!r}, priority {priority}"
 
 
-def check_library(protocol: DmxProtocol) -> None:
+def check_library(protocol: console_target.DmxProtocol) -> None:
     """Raise ConsoleError, with what to do, unless the library of a protocol is here."""
-    name = "sacn" if protocol is SACN else "pyartnet"
+    name = "sacn" if protocol is console_target.SACN else "pyartnet"
     if find_spec(name) is None:
         raise ConsoleError(f"{protocol.name} needs {name}: pip install 'lightpaint[stage]'")
 
 
 def _open_output(
-    target: ConsoleTarget, universes: Collection[int], *, priority: int, interface: str
+    target: console_target.ConsoleTarget,
+    universes: Collection[int],
+    *,
+    priority: int,
+    interface: str,
 ) -> LevelOutput:
     """Return the output for a target. Raises ConsoleError for an interface of another machine."""
     try:
         if interface:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
                 tried.bind((interface, 0))
-        if target.protocol is SACN:
+        if target.protocol is console_target.SACN:
             from lightpaint.dmx.network.sacn_output import SacnOutput
 
             return SacnOutput(

@@ -9,18 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import colour
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
 from lightpaint.basis import Basis, BasisLight, Lights
-from lightpaint.colour import (
-    EYE,
-    Lamp,
-    LampEmitter,
-    Observer,
-    Photometry,
-    luminance,
-    photometry,
-    rgb_of_powers,
-)
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, brief, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError
@@ -88,7 +79,7 @@ class LightSetting:
     standard_error: Errors | None = None
     interval: Intervals | None = None
     untold: bool = False
-    lamp: Lamp | None = None
+    lamp: colour.Lamp | None = None
     is_outside_gamut: bool = False
     part_of: str = ""
     mix: tuple[float, ...] | None = None
@@ -301,7 +292,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     places: tuple[EmitterPlace, ...] = ()
     up: Position = (0.0, 1.0, 0.0)
     animation: tuple[LightingKey, ...] = ()
-    observer: Observer = EYE
+    observer: colour.Observer = colour.EYE
 
     def __repr__(self) -> str:
         rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
@@ -360,12 +351,12 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         """RGB emission by name of light."""
         return {light.name: light.emission for light in self.lights}
 
-    def photometry(self, light: LightSetting) -> Photometry:
+    def photometry(self, light: LightSetting) -> colour.Photometry:
         """Return colour, temperature and flux of one of its lights.
 
         The colour of a light that reaches something in some channels only is unknown.
         """
-        measured = photometry(
+        measured = colour.photometry(
             light.physical_emission,
             unit=light.unit,
             unit_flux=light.unit_flux,
@@ -479,7 +470,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         *,
         labels: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
-        lamps: Mapping[int, Lamp] | None = None,
+        lamps: Mapping[int, colour.Lamp] | None = None,
         mixed_emissions: Mapping[int, RGB] | None = None,
         **fields: Any,
     ) -> "Lighting":
@@ -551,7 +542,7 @@ def _setting(
     weight: RGB,
     label: tuple[str, bool],
     reached: tuple[bool, bool, bool],
-    lamp: Lamp | None,
+    lamp: colour.Lamp | None,
     mixed_emission: RGB | None,
 ) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
@@ -633,13 +624,13 @@ def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
     )
 
 
-def in_own_color(emitter: LampEmitter) -> LampEmitter:
+def in_own_color(emitter: colour.LampEmitter) -> colour.LampEmitter:
     """Return an emitter, whose emission has its luminance in each channel, in its own colour."""
     return replace(emitter, emission=as_rgb(emitter.emission[0] * color_of_emitter(emitter)))
 
 
-def color_of_emitter(emitter: LampEmitter) -> Doubles:
+def color_of_emitter(emitter: colour.LampEmitter) -> Doubles:
     """Return the colour of an emitter's spectrum, (3,), of luminance 1."""
     assert emitter.spectrum is not None
-    color = rgb_of_powers(emitter.spectrum)
-    return np.asarray(color / luminance(color))
+    color = colour.rgb_of_powers(emitter.spectrum)
+    return np.asarray(color / colour.luminance(color))

@@ -15,31 +15,12 @@ from lightpaint.colour import Preference, SlotFilter, WhiteRange
 from lightpaint.display_text import brief, some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints import values
 from lightpaint.lighting.constraints.emitter_values import (
     EmitterRequest,
     has_slots,
     parse_emitters,
     parse_slots,
-)
-from lightpaint.lighting.constraints.values import (
-    Level,
-    Lock,
-    check_keys,
-    check_lengths,
-    describe_constraint,
-    parse_color,
-    parse_count,
-    parse_limits,
-    parse_lock,
-    parse_power_share,
-    parse_preference,
-    parse_primaries,
-    parse_rf,
-    parse_scale,
-    parse_start,
-    parse_strength,
-    parse_wheel,
-    parse_whites,
 )
 from lightpaint.sentences import Sentence, SourceKey
 from lightpaint.validation import MAX_LISTED
@@ -99,10 +80,10 @@ class LightConstraint:
     label: all this in few words. where: the name of the source in errors.
     """
 
-    lock: Lock | None = None
+    lock: values.Lock | None = None
     off: bool = False
-    least: Level | None = None
-    most: Level | None = None
+    least: values.Level | None = None
+    most: values.Level | None = None
     primaries: tuple[RGB, ...] | None = None
     whites: WhiteRange | None = None
     emitters: tuple[EmitterRequest, ...] = ()
@@ -130,20 +111,22 @@ class LightConstraint:
         Raises ConstraintError for invalid values and for keys that contradict each other.
         """
         key = SourceKey.of(where)
-        check_keys(table, LIGHT_KEYS, key)
-        check_lengths(table, key)
+        values.check_keys(table, LIGHT_KEYS, key)
+        values.check_lengths(table, key)
         table = {key: value for key, value in table.items() if value is not False}
         _check_contradictions(table, key)
-        lock = parse_lock(table["lock"], key / "lock") if "lock" in table else None
+        lock = values.parse_lock(table["lock"], key / "lock") if "lock" in table else None
         if "off" in table and table["off"] is not True:
             raise ConstraintError(key / "off", f" is {table['off']!r}: expected true or false")
         least, most = (
-            parse_limits(table["limits"], key / "limits") if "limits" in table else (None,) * 2
+            values.parse_limits(table["limits"], key / "limits")
+            if "limits" in table
+            else (None,) * 2
         )
-        primaries = parse_primaries(table, key)
-        whites = parse_whites(table, key)
+        primaries = values.parse_primaries(table, key)
+        whites = values.parse_whites(table, key)
         emitters = parse_emitters(table, key)
-        share, least_rf = parse_power_share(table, key), parse_rf(table, key)
+        share, least_rf = values.parse_power_share(table, key), values.parse_rf(table, key)
         _check_emitters(table, key, primaries)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
@@ -160,8 +143,8 @@ class LightConstraint:
                     f"the mix "
                     "of its colours open: lock it at a colour",
                 )
-            lock, primaries = Lock(lock.level, primaries[0]), None
-        wheel = parse_wheel(table, key, [x.name for x in emitters])
+            lock, primaries = values.Lock(lock.level, primaries[0]), None
+        wheel = values.parse_wheel(table, key, [x.name for x in emitters])
         is_off, label = "off" in table, _label(table)
         lamp = emitters, share, wheel, least_rf, parse_slots(table, key)
         return cls(lock, is_off, least, most, primaries, whites, *lamp, label, key)
@@ -198,7 +181,9 @@ def _check_emitters(
 
 
 def _label(table: Mapping[str, Any]) -> str:
-    return ", ".join(describe_constraint(key, table[key]) for key in LIGHT_KEYS if key in table)
+    return ", ".join(
+        values.describe_constraint(key, table[key]) for key in LIGHT_KEYS if key in table
+    )
 
 
 @dataclass(frozen=True)
@@ -311,12 +296,12 @@ class Constraints:
         return cls(
             tuple(lights),
             _parse_ties(tie, source / "tie"),
-            parse_strength(prefer_current, source / "prefer_current"),
-            parse_count(sparse, source / "sparse"),
-            parse_start({} if start is None else start, source / "start"),
-            parse_strength(near, source / "near"),
-            parse_scale(cd_per_unit, source / "cd_per_unit"),
-            parse_preference(prefer_emitters, source / "prefer_emitters"),
+            values.parse_strength(prefer_current, source / "prefer_current"),
+            values.parse_count(sparse, source / "sparse"),
+            values.parse_start({} if start is None else start, source / "start"),
+            values.parse_strength(near, source / "near"),
+            values.parse_scale(cd_per_unit, source / "cd_per_unit"),
+            values.parse_preference(prefer_emitters, source / "prefer_emitters"),
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
@@ -396,9 +381,11 @@ def _parse_ties(value: Any, where: SourceKey) -> tuple[Tie, ...]:
     ties = []
     for entry in value:
         if isinstance(entry, Mapping):
-            check_keys(entry, ("lights", "color"), where)
+            values.check_keys(entry, ("lights", "color"), where)
             names = entry.get("lights")
-            color = parse_color(entry["color"], where / "color") if "color" in entry else None
+            color = (
+                values.parse_color(entry["color"], where / "color") if "color" in entry else None
+            )
         else:
             names, color = entry, None
         if isinstance(names, str) or not isinstance(names, Sequence):

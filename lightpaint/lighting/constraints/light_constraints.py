@@ -18,15 +18,7 @@ from lightpaint.colour import cct_and_duv
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.images import Estimate
-from lightpaint.lighting.constraints.constraint_table import (
-    COLOR_KEYS,
-    LAMP_KEYS,
-    Constraints,
-    LightConstraint,
-    Tie,
-    is_pattern,
-    merge_tables,
-)
+from lightpaint.lighting.constraints import constraint_table
 from lightpaint.scene.lights.texels import coarse_name, image_of
 from lightpaint.sentences import Hint, Lead, SourceKey
 
@@ -64,24 +56,24 @@ KEYS_BY_KIND: Mapping[str, tuple[str, ...]] = {
     "off": ("off",),
     "lock": ("lock",),
     "limits": ("limits",),
-    "colour": (*COLOR_KEYS, "duv"),
+    "colour": (*constraint_table.COLOR_KEYS, "duv"),
 }
 
 
 def constraints_by_light(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> list[LightConstraint | None]:
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> list[constraint_table.LightConstraint | None]:
     """Return the constraint on each light, None without one; names win over patterns."""
-    made: dict[tuple[int, str], LightConstraint] = {}
+    made: dict[tuple[int, str], constraint_table.LightConstraint] = {}
     tables = tables_by_light(constraints, lights)
     for table, where in tables:
         if table and (id(table), where) not in made:
-            made[id(table), where] = LightConstraint.of(table, where=where)
+            made[id(table), where] = constraint_table.LightConstraint.of(table, where=where)
     return [made.get((id(table), where)) for table, where in tables]
 
 
 def tables_by_light(
-    constraints: Constraints, lights: Sequence[BasisLight]
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
 ) -> list[tuple[dict[str, Any], str]]:
     """Return the merged keys and values for each light, and the source of the last of them.
 
@@ -93,32 +85,32 @@ def tables_by_light(
         for k in _match_lights(name, lights, origin, only_keeps=_only_keeps(wish)):
             below = tables[k][0]
             if id(below) not in merged:
-                merged[id(below)] = merge_tables(below, wish)
+                merged[id(below)] = constraint_table.merge_tables(below, wish)
             tables[k] = merged[id(below)], origin
     return tables
 
 
 def _only_keeps(wish: Mapping[str, Any]) -> bool:
     """Return whether keys only say what a light is or that it stays, as a fixed light does."""
-    return wish == {"lock": True} or wish.keys() <= {*LAMP_KEYS}
+    return wish == {"lock": True} or wish.keys() <= {*constraint_table.LAMP_KEYS}
 
 
 def constraints_on_parts(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> tuple[Constraints, Constraints]:
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> tuple[constraint_table.Constraints, constraint_table.Constraints]:
     """Return the constraints on single emitters of lamps, by their names, and all others."""
     names = {light.name for light in lights if light.lamp}
     is_part = [name in names for name, _, _ in constraints.lights]
     own = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if is_own)
     rest = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if not is_own)
-    return Constraints(lights=own), replace(constraints, lights=rest)
+    return constraint_table.Constraints(lights=own), replace(constraints, lights=rest)
 
 
 def tied_lights(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> dict[int, tuple[Tie, list[int]]]:
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> dict[int, tuple[constraint_table.Tie, list[int]]]:
     """Return the tie of each tied light, and the indices of its members in their order."""
-    ties: dict[int, tuple[Tie, list[int]]] = {}
+    ties: dict[int, tuple[constraint_table.Tie, list[int]]] = {}
     for tie in constraints.ties:
         members = sorted({k for name in tie.lights for k in _match_lights(name, lights, tie.where)})
         listed = some_names(tie.lights)
@@ -135,7 +127,9 @@ def tied_lights(
     return ties
 
 
-def lights_of_open_color(constraints: Constraints, lights: Sequence[BasisLight]) -> list[int]:
+def lights_of_open_color(
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> list[int]:
     """Return the indices of lights that may take any colour under `constraints`."""
     tied = tied_lights(constraints, lights)
     return [
@@ -190,7 +184,7 @@ def _is_meant(light: str, name: str) -> bool:
     """Return whether a name or pattern means a light: its image, or the coarse texel in whose place
     a finer one is, mean it too.
     """
-    matching = fnmatchcase if is_pattern(name) else str.__eq__
+    matching = fnmatchcase if constraint_table.is_pattern(name) else str.__eq__
     return name in (light, image_of(light)) or matching(coarse_name(light) or light, name)
 
 
@@ -241,15 +235,17 @@ def _painted_white(color: Doubles) -> tuple[float, float]:
 
 
 def whiten_open_lights(
-    constraints: Constraints, lights: Sequence[BasisLight], whites: WhiteLimits | None = None
-) -> Constraints:
+    constraints: constraint_table.Constraints,
+    lights: Sequence[BasisLight],
+    whites: WhiteLimits | None = None,
+) -> constraint_table.Constraints:
     """Return constraints in which every light of open colour also stays between two whites.
 
     whites: of each light, in kelvin; None for LAMP_KELVINS.
     """
     limits = whites or (LAMP_KELVINS,) * len(lights)
     return constraints.and_then(
-        Constraints.of(
+        constraint_table.Constraints.of(
             {
                 lights[k].name: {"kelvin": list(limits[k])}
                 for k in lights_of_open_color(constraints, lights)
@@ -258,7 +254,9 @@ def whiten_open_lights(
     )
 
 
-def keep_own_colors(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
+def keep_own_colors(
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> constraint_table.Constraints:
     """Return constraints in which every light of open colour also keeps its current one.
 
     A light that is off has no colour, and is white.
@@ -268,11 +266,11 @@ def keep_own_colors(constraints: Constraints, lights: Sequence[BasisLight]) -> C
         lights[k].name: {"color": own[k].tolist() if own[k].any() else "#fff"}
         for k in lights_of_open_color(constraints, lights)
     }
-    return constraints.and_then(Constraints.of(own_colors))
+    return constraints.and_then(constraint_table.Constraints.of(own_colors))
 
 
 def own_color_labels(
-    labels: Sequence[str], constraints: Constraints, lights: Sequence[BasisLight]
+    labels: Sequence[str], constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
 ) -> tuple[str, ...]:
     """Return the labels (n,) of lights under `constraints` together with that restriction."""
     open_lights = set(lights_of_open_color(constraints, lights))
@@ -291,10 +289,12 @@ class ConstraintsByLight:
 
     lights: Sequence[BasisLight]
     tables: Sequence[dict[str, Any]]
-    constraints: Constraints
+    constraints: constraint_table.Constraints
 
     @staticmethod
-    def of(constraints: Constraints, lights: Sequence[BasisLight]) -> "ConstraintsByLight":
+    def of(
+        constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+    ) -> "ConstraintsByLight":
         """Resolve `constraints` on these lights."""
         tables = [
             {key: value for key, value in table.items() if value is not False}
@@ -327,7 +327,9 @@ class ConstraintsByLight:
             units.setdefault((images.get(k, -1), -1 if k in images else k), []).append(k)
         return list(units.values())
 
-    def without(self, kind: ConstraintKind, lights: Collection[int]) -> Constraints:
+    def without(
+        self, kind: ConstraintKind, lights: Collection[int]
+    ) -> constraint_table.Constraints:
         """Return the constraints without one kind, for lights at these places."""
         if kind == "sparse":
             return replace(self.constraints, sparse=None)

@@ -6,27 +6,12 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
+from lightpaint import colour, validation
 from lightpaint.arrays import RGB, as_rgb
-from lightpaint.colour import (
-    Preference,
-    WhiteRange,
-    hex_to_rgb,
-    kelvin_to_rgb,
-    luminance,
-    white_range,
-)
 from lightpaint.display_text import known_keys, some_names
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.sentences import SourceKey
-from lightpaint.validation import (
-    BRIGHTEST,
-    MAX_NAME,
-    MAX_PRIMARIES,
-    is_amount,
-    is_number,
-    parse_number,
-)
 
 
 @dataclass(frozen=True)
@@ -70,11 +55,11 @@ def check_lengths(table: Mapping[str, Any], where: SourceKey) -> None:
         if isinstance(value, Mapping):
             texts = [x for pair in value.items() for x in pair]
         for text in texts:
-            if isinstance(text, str | list | tuple | Mapping) and len(text) > MAX_NAME:
+            if isinstance(text, str | list | tuple | Mapping) and len(text) > validation.MAX_NAME:
                 raise ConstraintError(
                     where / key,
                     f" has a value of {len(text)} characters or numbers: at most "
-                    f"{MAX_NAME} are read",
+                    f"{validation.MAX_NAME} are read",
                 )
 
 
@@ -102,17 +87,19 @@ def parse_level(value: Any, where: SourceKey, expected: str = "") -> Level:
     if isinstance(value, str):
         text = value.strip()
         try:
-            number = parse_number(text.removesuffix("%"))
+            number = validation.parse_number(text.removesuffix("%"))
         except ValueError:
             number = -1.0
-        if not is_amount(number):
-            raise ConstraintError(where, f" is {value!r}: {expected}, of at most {BRIGHTEST:g}")
+        if not validation.is_amount(number):
+            raise ConstraintError(
+                where, f" is {value!r}: {expected}, of at most {validation.BRIGHTEST:g}"
+            )
         return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
-    if is_number(value) and is_amount(value):
+    if validation.is_number(value) and validation.is_amount(value):
         return Level(float(value))
     if is_emission(value):
         return Level(as_rgb(value))
-    raise ConstraintError(where, f" is {value!r}: {expected}, of at most {BRIGHTEST:g}")
+    raise ConstraintError(where, f" is {value!r}: {expected}, of at most {validation.BRIGHTEST:g}")
 
 
 def parse_limits(value: Any, where: SourceKey) -> tuple[Level | None, Level | None]:
@@ -145,25 +132,25 @@ def parse_primaries(table: Mapping[str, Any], where: SourceKey) -> tuple[RGB, ..
             where / "primaries",
             f' is {one_line(repr(listed))}: expected a list of colours, ["#ff0000", "3000K"]',
         )
-    if len(listed) > MAX_PRIMARIES:
+    if len(listed) > validation.MAX_PRIMARIES:
         raise ConstraintError(
             where / "primaries",
-            f" lists {len(listed)} colours: at most {MAX_PRIMARIES} can be mixed",
+            f" lists {len(listed)} colours: at most {validation.MAX_PRIMARIES} can be mixed",
         )
     return tuple(parse_color(color, where / "primaries") for color in listed)
 
 
-def parse_whites(table: Mapping[str, Any], where: SourceKey) -> WhiteRange | None:
+def parse_whites(table: Mapping[str, Any], where: SourceKey) -> colour.WhiteRange | None:
     """Return the range of white that a light keeps to; None without one."""
     ends = _parse_kelvins(table["kelvin"], where / "kelvin") if "kelvin" in table else []
-    return white_range(*ends, _parse_duv(table, where)) if len(ends) == 2 else None
+    return colour.white_range(*ends, _parse_duv(table, where)) if len(ends) == 2 else None
 
 
 def _parse_kelvins(value: Any, where: SourceKey) -> list[float]:
     """Return one temperature, or both ends of a range."""
-    ends = [value] if is_number(value) else value
+    ends = [value] if validation.is_number(value) else value
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
-    if not is_range or not all(map(is_number, ends)) or sorted(ends) != list(ends):
+    if not is_range or not all(map(validation.is_number, ends)) or sorted(ends) != list(ends):
         raise ConstraintError(
             where,
             f" is {value!r}: expected a temperature, 3200, or a range from low to high, "
@@ -176,9 +163,9 @@ def parse_color(value: Any, where: SourceKey, *, duv: float = 0.0) -> RGB:
     """Parse a colour: `"#ffaa66"`, `"3200K"` or `[r, g, b]`; return it at luminance 1."""
     try:
         if isinstance(value, str) and value.strip().startswith("#"):
-            rgb = hex_to_rgb(value)
+            rgb = colour.hex_to_rgb(value)
         elif isinstance(value, str) and value.strip().upper().endswith("K"):
-            return _parse_kelvin(parse_number(value.strip()[:-1]), duv, where)
+            return _parse_kelvin(validation.parse_number(value.strip()[:-1]), duv, where)
         elif is_emission(value):
             rgb = np.array(value, dtype=np.float64)
         else:
@@ -191,26 +178,26 @@ def parse_color(value: Any, where: SourceKey, *, duv: float = 0.0) -> RGB:
         raise ConstraintError(
             where, f" is {value!r}, black, which is not a colour of light: use off"
         )
-    return as_rgb(rgb / luminance(rgb))
+    return as_rgb(rgb / colour.luminance(rgb))
 
 
 def _parse_kelvin(kelvin: float, duv: float, where: SourceKey) -> RGB:
     try:
-        return as_rgb(kelvin_to_rgb(kelvin, duv))
+        return as_rgb(colour.kelvin_to_rgb(kelvin, duv))
     except ColorError as error:
         raise ConstraintError(where, ": ", error) from None
 
 
 def _parse_duv(table: Mapping[str, Any], where: SourceKey) -> float:
     duv = table.get("duv", 0.0)
-    if not (is_number(duv) and is_amount(abs(duv))):
+    if not (validation.is_number(duv) and validation.is_amount(abs(duv))):
         raise ConstraintError(where / "duv", f" is {duv!r}: expected a number like 0.003")
     return float(duv)
 
 
 def parse_strength(value: Any, where: SourceKey) -> float:
     """Return the strength of a pull."""
-    if not (is_number(value) and is_amount(value)):
+    if not (validation.is_number(value) and validation.is_amount(value)):
         raise ConstraintError(where, f" is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)
 
@@ -236,27 +223,29 @@ def parse_count(value: Any, where: SourceKey) -> int | None:
 
 def parse_scale(value: Any, where: SourceKey) -> float | None:
     """Return cd/m² of a radiance of 1, if given."""
-    if value is not None and not (is_number(value) and 0 < value <= BRIGHTEST):
+    if value is not None and not (
+        validation.is_number(value) and 0 < value <= validation.BRIGHTEST
+    ):
         raise ConstraintError(
             where, f" is {value!r}: expected candelas of an intensity of 1 in the scene, like 1000"
         )
     return None if value is None else float(value)
 
 
-def parse_preference(value: Any, where: SourceKey) -> Preference | None:
+def parse_preference(value: Any, where: SourceKey) -> colour.Preference | None:
     """Return the preference among mixes of emitters, if there is one."""
-    known = get_args(Preference)
+    known = get_args(colour.Preference)
     if value is not None and value not in known:
         raise ConstraintError(
             where, f" is {one_line(repr(value))}: expected one of {', '.join(known)}"
         )
-    return cast("Preference | None", value)
+    return cast("colour.Preference | None", value)
 
 
 def parse_power_share(table: Mapping[str, Any], where: SourceKey) -> float | None:
     """Return the largest power of a lamp's emitters, relative to the power of all at full."""
     value = table.get("power_share")
-    if value is not None and not (is_number(value) and 0 < value <= 1):
+    if value is not None and not (validation.is_number(value) and 0 < value <= 1):
         raise ConstraintError(
             where / "power_share", f" is {value!r}: expected a share of full power like 0.6"
         )
@@ -279,7 +268,7 @@ def parse_wheel(table: Mapping[str, Any], where: SourceKey, slots: Sequence[str]
 def parse_rf(table: Mapping[str, Any], where: SourceKey) -> float | None:
     """Return the least fidelity index Rf of a lamp's mix."""
     value = table.get("rf")
-    if value is not None and not (is_number(value) and 0 < value <= 100):
+    if value is not None and not (validation.is_number(value) and 0 < value <= 100):
         raise ConstraintError(
             where / "rf",
             f" is {one_line(repr(value))}: expected the least Rf of TM-30, above 0 and at most "
@@ -312,7 +301,7 @@ def describe_constraint(key: str, value: Any) -> str:
 def _text(value: Any) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return " ".join(map(_text, value))
-    return f"{value:g}" if is_number(value) else str(value)
+    return f"{value:g}" if validation.is_number(value) else str(value)
 
 
 def is_emission(value: Any) -> bool:
@@ -321,5 +310,5 @@ def is_emission(value: Any) -> bool:
         isinstance(value, Sequence)
         and not isinstance(value, str)
         and len(value) == 3
-        and all(is_number(v) and is_amount(v) for v in value)
+        and all(validation.is_number(v) and validation.is_amount(v) for v in value)
     )

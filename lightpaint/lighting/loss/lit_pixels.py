@@ -30,14 +30,7 @@ from lightpaint.basis import (
 from lightpaint.colour import ViewTransform
 from lightpaint.images import Estimate, block_sums, enlarged
 from lightpaint.lighting.joined_views import Views
-from lightpaint.lighting.loss.pixel_loss import (
-    Cut,
-    Loss,
-    PixelLoss,
-    SquaredPixels,
-    Squares,
-    image_in_place,
-)
+from lightpaint.lighting.loss import pixel_loss
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.progress import with_progress
@@ -69,16 +62,16 @@ class LitPixels:
     """
 
     planes: Planes
-    pixels: PixelLoss
+    pixels: pixel_loss.PixelLoss
     which: Indices | None = None
 
     @classmethod
-    def whole(cls, basis: Basis, loss: Loss) -> "LitPixels":
+    def whole(cls, basis: Basis, loss: pixel_loss.Loss) -> "LitPixels":
         """Return all pixels."""
         return cls(basis.planes, loss.pixels)
 
     @classmethod
-    def of(cls, basis: Basis, loss: Loss) -> "LitPixels":
+    def of(cls, basis: Basis, loss: pixel_loss.Loss) -> "LitPixels":
         """Return the pixels that count."""
         whole = cls.whole(basis, loss)
         counted = np.flatnonzero(whole.pixels.importance)
@@ -86,10 +79,10 @@ class LitPixels:
             return whole
         return cls(basis.planes.picked(counted), whole.pixels.subset(counted), counted)
 
-    def summed(self, squares: Squares, equations: NormalEquations) -> "SummedSquares":
+    def summed(self, squares: pixel_loss.Squares, equations: NormalEquations) -> "SummedSquares":
         """Return squares of the whole picture, whose problem is known, for these pixels."""
         pixels = squares.pixels
-        assert isinstance(pixels, SquaredPixels)
+        assert isinstance(pixels, pixel_loss.SquaredPixels)
         which = slice(None) if self.which is None else self.which
         return SummedSquares(pixels.image[:, which], pixels.weight[:, which], equations)
 
@@ -106,7 +99,7 @@ class LitPixels:
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
-        def strip_terms(strip: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
+        def strip_terms(strip: slice, pixels: pixel_loss.PixelLoss) -> tuple[float, Doubles]:
             rows = self.planes.pixels(strip).transpose(2, 0, 1).astype(np.float64, order="C")
             x = np.stack([w @ lit for w, lit in zip(weights.T, rows, strict=True)])
             value, slope = pixels.objective_and_gradient(x)
@@ -118,7 +111,7 @@ class LitPixels:
     def products(self, picture: Doubles) -> Doubles:
         """Return the inner products of each light with a picture (3, p), (n, 3)."""
 
-        def strip_products(strip: slice, _: PixelLoss) -> Doubles:
+        def strip_products(strip: slice, _: pixel_loss.PixelLoss) -> Doubles:
             rows = self.planes.pixels(strip)
             return np.stack(
                 [rows[..., c].astype(np.float64) @ picture[c, strip] for c in range(3)], axis=1
@@ -130,7 +123,7 @@ class LitPixels:
         """Return half of the slope at which Σ weight (image − x)² falls at x on the way to
         `ahead`."""
 
-        def strip_slope(strip: slice, _: PixelLoss) -> float:
+        def strip_slope(strip: slice, _: pixel_loss.PixelLoss) -> float:
             here_x = x[:, strip]
             return float(
                 (weight[:, strip] * (image[:, strip] - here_x) * (ahead[:, strip] - here_x)).sum()
@@ -194,7 +187,7 @@ class SummedSquares:
         return equations
 
 
-class DeferredSquares(Squares):
+class DeferredSquares(pixel_loss.Squares):
     """The squares of a loss at one picture, made when they are asked for, until they are released.
 
     They are as large as several pictures, and most answers need only their sums.
@@ -211,9 +204,9 @@ class DeferredSquares(Squares):
         size = self._lit.planes.size
         shares = pixels.shares(x, weight)
         return (
-            image_in_place(image, size),
-            image_in_place(weight, size),
-            image_in_place(shares, size),
+            pixel_loss.image_in_place(image, size),
+            pixel_loss.image_in_place(weight, size),
+            pixel_loss.image_in_place(shares, size),
         )
 
     @property
@@ -248,7 +241,7 @@ class BinnedPixels:
     """
 
     basis: Basis
-    loss: Loss
+    loss: pixel_loss.Loss
     side: int
 
     @cached_property
@@ -329,7 +322,7 @@ def _display_noise(
     return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
 
 
-def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
+def bin_pixels(views: Views, loss: pixel_loss.Loss, side: int) -> BinnedPixels | None:
     """Return the blocks of a loss over all `views`, with pixels weighted by importance.
 
     None for a loss that only fits single pixels.
@@ -337,7 +330,7 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
     images: list[Planes] = []
     halves: list[Planes] = []
     looks: list[Estimate] = []
-    parts: list[tuple[Cut, Doubles]] = []
+    parts: list[tuple[pixel_loss.Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
         cut = partial(views.part, k=k)
         view_loss = loss.cut(cut)

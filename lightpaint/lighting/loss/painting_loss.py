@@ -11,15 +11,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import ViewTransform
 from lightpaint.images import BAND_PIXELS, block_sums, by_bands
-from lightpaint.lighting.loss.pixel_loss import (
-    STRIP_PIXELS,
-    Cut,
-    Loss,
-    PixelLoss,
-    contiguous_rows,
-    image_of,
-    planes_of,
-)
+from lightpaint.lighting.loss import pixel_loss
 from lightpaint.threads import parallel_map
 
 #: Relative change of light over which the bend of a display's curve is measured.
@@ -34,7 +26,7 @@ PICTURES = ("painted", "importance", "share", "current", "at_least")
 
 
 @dataclass(frozen=True)
-class PaintedPixels(PixelLoss):
+class PaintedPixels(pixel_loss.PixelLoss):
     """Pixels of a `PaintingLoss`, in which the formula stands.
 
     painted, current: (3, p), linear, of any precision. importance, share: (p,). at_least: (3, p),
@@ -53,11 +45,13 @@ class PaintedPixels(PixelLoss):
         """Return some of the pixels."""
         return replace(
             self,
-            painted=contiguous_rows(self.painted, which),
+            painted=pixel_loss.contiguous_rows(self.painted, which),
             importance=self.importance[which],
             share=self.share[which],
-            current=contiguous_rows(self.current, which),
-            at_least=None if self.at_least is None else contiguous_rows(self.at_least, which),
+            current=pixel_loss.contiguous_rows(self.current, which),
+            at_least=None
+            if self.at_least is None
+            else pixel_loss.contiguous_rows(self.at_least, which),
             encoded=None
             if self.encoded is None
             else (self.encoded[0][:, which], self.encoded[1][:, which]),
@@ -338,7 +332,7 @@ def _with_chords(own_slope: Doubles, slope: Doubles, missed: Doubles, distance: 
 
 
 @dataclass(frozen=True)
-class PaintingLoss(Loss):
+class PaintingLoss(pixel_loss.Loss):
     """The loss of pictures against a painting, as a display shows both, or as light.
 
     With the importance D, the part q of it that is for the current look C, and the view
@@ -360,17 +354,17 @@ class PaintingLoss(Loss):
     at_least: Bools
     transform: ViewTransform | None = None
 
-    def cut(self, part: Cut) -> "PaintingLoss":
+    def cut(self, part: pixel_loss.Cut) -> "PaintingLoss":
         pictures: dict[str, Any] = {name: part(getattr(self, name)) for name in PICTURES}
         return replace(self, **pictures)
 
     @cached_property
     def pixels(self) -> PaintedPixels:
         """All pixels, channel by channel: of many, in the memory of the pictures."""
-        is_long = self.importance.size > STRIP_PIXELS  # strips of them are copied
+        is_long = self.importance.size > pixel_loss.STRIP_PIXELS  # strips of them are copied
 
         def planes(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
-            return image.reshape(-1, 3).T if is_long else planes_of(image, image.dtype)
+            return image.reshape(-1, 3).T if is_long else pixel_loss.planes_of(image, image.dtype)
 
         return PaintedPixels(
             planes(self.painted),
@@ -385,12 +379,12 @@ class PaintingLoss(Loss):
         """Return V of linear pixels, (…, 3)."""
         if self.transform is None:
             return np.array(image, np.float64)
-        planes = planes_of(image)
+        planes = pixel_loss.planes_of(image)
         encoded = np.empty_like(planes)
-        for start in range(0, planes.shape[1], STRIP_PIXELS):
-            strip = slice(start, start + STRIP_PIXELS)
+        for start in range(0, planes.shape[1], pixel_loss.STRIP_PIXELS):
+            strip = slice(start, start + pixel_loss.STRIP_PIXELS)
             encoded[:, strip] = self.transform.encode_planes(planes[:, strip])
-        return image_of(encoded, image.shape[:-1])
+        return pixel_loss.image_of(encoded, image.shape[:-1])
 
     def goal(self, x: Floats) -> Doubles:
         """Return (1 − q) ψ + q C at a picture x, (h, w, 3) linear."""
@@ -417,7 +411,9 @@ class PaintingLoss(Loss):
         """Return ψ at x, (h, w, 3)."""
         return np.asarray(np.where(self.exceeds(x), x, self.painted), np.float64)
 
-    def block_means(self, parts: Sequence[tuple[Cut, Doubles]], side: int) -> "PaintingLoss":
+    def block_means(
+        self, parts: Sequence[tuple[pixel_loss.Cut, Doubles]], side: int
+    ) -> "PaintingLoss":
         averages = [self.cut(cut)._block_average(counts, side) for cut, counts in parts]
 
         def row(name: str) -> npt.NDArray[Any]:

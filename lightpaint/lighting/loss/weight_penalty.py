@@ -58,14 +58,7 @@ from lightpaint.basis import Lights, light_images, texel_lights
 from lightpaint.colour import LUMINANCE, ViewTransform, luminance
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.expected_lights import (
-    DARK,
-    UNIFORM_STOPS,
-    ExpectedLights,
-    FlameWishes,
-    Wash,
-    adjusted_share,
-)
+from lightpaint.lighting.loss import expected_lights
 from lightpaint.lighting.loss.footprints import find_footprint, footprint_term
 from lightpaint.lighting.loss.painting_loss import display_amplitude
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -150,7 +143,10 @@ class ContrastRows:
     @classmethod
     @one_thread()
     def of(
-        cls, wash: Wash, transform: ViewTransform | None, texel_weights: Doubles | None = None
+        cls,
+        wash: expected_lights.Wash,
+        transform: ViewTransform | None,
+        texel_weights: Doubles | None = None,
     ) -> Self:
         """Make the rows of a painting.
 
@@ -186,8 +182,8 @@ class ContrastRows:
         )
         stops = wash.asked()
         # What was repainted as it is was not adjusted.
-        is_changed = np.abs(stops).max(axis=0) > UNIFORM_STOPS
-        exact = np.maximum(wash.exact, adjusted_share(wash, stops)) * is_changed
+        is_changed = np.abs(stops).max(axis=0) > expected_lights.UNIFORM_STOPS
+        exact = np.maximum(wash.exact, expected_lights.adjusted_share(wash, stops)) * is_changed
         return cls(
             amplitude[..., None] * (own - rest),
             rest_amplitude[..., None] * rest,
@@ -212,7 +208,7 @@ class ContrastRows:
 
 
 def flame_term(
-    flames: FlameWishes, transform: ViewTransform | None, strength: float
+    flames: expected_lights.FlameWishes, transform: ViewTransform | None, strength: float
 ) -> NormalEquations | None:
     """Return the term of wishes for emitters in view; None without any.
 
@@ -233,7 +229,7 @@ def flame_term(
 
 
 def _subjects_and_rests(
-    wash: Wash, area: Doubles, places: Indices, total: float
+    wash: expected_lights.Wash, area: Doubles, places: Indices, total: float
 ) -> list[tuple[Doubles, Doubles]]:
     """Return the shares of blocks, (p,), whose sums are means over each place of a wish and over
     the rest of the picture; none for a wish without a contrast.
@@ -252,7 +248,7 @@ def _subjects_and_rests(
     return [(x / x.sum(), rest / rest.sum()) for x in subjects]
 
 
-def _stroke_shares(wash: Wash) -> Doubles:
+def _stroke_shares(wash: expected_lights.Wash) -> Doubles:
     """Return the share of each wish that layers of strokes paint, (k,)."""
     areas = wash.wishes * wash.counts
     common = np.minimum(areas, wash.strokes * wash.counts).sum(axis=1)
@@ -290,14 +286,14 @@ class PaintTerms:
     does to unpainted pixels; None without any.
     """
 
-    expected: ExpectedLights | None = None
+    expected: expected_lights.ExpectedLights | None = None
     contrast: NormalEquations | None = None
     restraint: NormalEquations | None = None
 
     @classmethod
     def of(
         cls,
-        wash: Wash,
+        wash: expected_lights.Wash,
         fit: Fit,
         own: Doubles,
         *,
@@ -317,7 +313,7 @@ class PaintTerms:
         # The picture of a footprint has its own contrast.
         left = 1.0 if footprint is None else 1 - footprint.confidence
         return cls(
-            ExpectedLights.of(wash, own) if keeps_colors else None,
+            expected_lights.ExpectedLights.of(wash, own) if keeps_colors else None,
             _sum(
                 contrast.term(left * importance),
                 None
@@ -379,7 +375,7 @@ def weight_pull(
     prefer_current: float,
     painted_share: float,
     keeps_color: Bools,
-    expected: ExpectedLights | None = None,
+    expected: expected_lights.ExpectedLights | None = None,
 ) -> NormalEquations | None:
     """Return the sum of all pulls on the weights; None without any.
 
@@ -395,7 +391,7 @@ def weight_pull(
         else []
     )
     if gentle:
-        expected = expected or ExpectedLights.unchanged(current)
+        expected = expected or expected_lights.ExpectedLights.unchanged(current)
         strength = COLOR_PULL + expected.clarity * (CLEAR_PULL - COLOR_PULL)
         strength *= gentle * dimming_factors(current, expected.emission)
         added.append(pull_to_colors(strength[:, None] * power, current, keeps_color))
@@ -438,7 +434,11 @@ def pull_near_start(
 
 @one_thread()
 def restrain_lights(
-    wash: Wash, reference: Doubles, transform: ViewTransform | None, *, unpainted: float
+    wash: expected_lights.Wash,
+    reference: Doubles,
+    transform: ViewTransform | None,
+    *,
+    unpainted: float,
 ) -> NormalEquations | None:
     """Return the price of what each light by itself does to unpainted pixels; None without a hold.
 
@@ -456,7 +456,7 @@ def restrain_lights(
     if unpainted <= 0:
         return None
     sampled = slice(None, None, ceil(wash.counts.size / RESTRAINT_BLOCKS))
-    dark = DARK * float(np.maximum(wash.look, 0).mean()) or 1.0
+    dark = expected_lights.DARK * float(np.maximum(wash.look, 0).mean()) or 1.0
     look = np.maximum(wash.look[:, sampled], 0).astype(np.float64)
     slope = display_amplitude(look, transform) / (look + dark)
     counts = wash.counts * (1 - np.minimum(wash.importance, 1))
@@ -496,7 +496,7 @@ def image_prior(
     power: Doubles,
     fit: Fit,
     painted_share: float,
-    expected: ExpectedLights | None = None,
+    expected: expected_lights.ExpectedLights | None = None,
 ) -> NormalEquations | None:
     """Return the penalty for all images in texels among `lights`; None if there are none.
 
@@ -538,7 +538,7 @@ def image_prior(
     staying = pull_to_current(IMAGE_STAYING * shares, current)
     if fit.colors != "gentle":
         return even + staying + pull_to_colors(IMAGE_COLOR * shares, current, texel_lights(lights))
-    expected = expected or ExpectedLights.unchanged(current)
+    expected = expected or expected_lights.ExpectedLights.unchanged(current)
     color = (GENTLE_IMAGE_COLOR + expected.clarity * (IMAGE_COLOR - GENTLE_IMAGE_COLOR))[:, None]
     colors = pull_to_colors(color * shares, current, texel_lights(lights))
     return even + staying + colors

@@ -14,18 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
+from lightpaint import colour
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis
-from lightpaint.colour import (
-    DIRECTIONS,
-    ROUND_OFF,
-    ColorHull,
-    chromaticity,
-    luminance,
-    reach_of,
-    sides_of,
-    white_range,
-)
 from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
 from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
 
@@ -152,13 +143,17 @@ class Gamuts:
         self._is_bold, self._in_view = is_bold, in_view
         self._light, self._power, self._current = light, power, current
         self._exempt = np.zeros(len(current), bool) if exempt is None else exempt
-        self._own = np.where(luminance(current)[:, None] > 0, current, 1.0)
+        self._own = np.where(colour.luminance(current)[:, None] > 0, current, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
-        own_reach = chromaticity(self._own) @ DIRECTIONS.T
-        lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
+        own_reach = colour.chromaticity(self._own) @ colour.DIRECTIONS.T
+        lamps, whites = (
+            colour.reach_of(colour.white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS)
+        )
         self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
         self._whites = whites
-        self._cool_whites = reach_of(white_range(LAMP_KELVINS[1], ALL_KELVINS[1]).colors)
+        self._cool_whites = colour.reach_of(
+            colour.white_range(LAMP_KELVINS[1], ALL_KELVINS[1]).colors
+        )
         # Off-white lamps lie near the whites, and so do surfaces under them; coloured lamps do not.
         self._off_white = np.maximum(own_reach - whites, 0).max(axis=1)
         is_near_white = self._off_white <= PAINTED_MARGIN
@@ -167,19 +162,19 @@ class Gamuts:
         allowed = self._reach
         if in_view is not None:
             allowed = np.where(in_view.lamps[:, None], self._own_reach, self._reach)
-        self._sides = sides_of(allowed - REACH_STEP)
+        self._sides = colour.sides_of(allowed - REACH_STEP)
         self._needed: _NeededLight | None = None
-        self._gamuts: dict[int, ColorHull] = {}
-        self._former_gamuts: dict[int, ColorHull] = {}
+        self._gamuts: dict[int, colour.ColorHull] = {}
+        self._former_gamuts: dict[int, colour.ColorHull] = {}
 
     def __len__(self) -> int:
         return len(self._current)
 
-    def __getitem__(self, light: int) -> ColorHull:
+    def __getitem__(self, light: int) -> colour.ColorHull:
         if light not in self._gamuts:
             reach = self._painted_reach(light)
             if self._in_view is not None and self._in_view.lamps[light]:
-                painted = chromaticity(self._in_view.painted()[light]) @ DIRECTIONS.T
+                painted = colour.chromaticity(self._in_view.painted()[light]) @ colour.DIRECTIONS.T
                 seen = np.maximum(self._own_reach[light], painted.max(axis=0) + WHITE_MARGIN)
                 reach = np.minimum(reach, seen)
             self._gamuts[light] = self._hull(light, reach)
@@ -190,7 +185,7 @@ class Gamuts:
         if self._needed is None:
             self._needed = _NeededLight.of(self._light(), self._power, self._current)
         needed = self._needed.reach(light)
-        lamp = chromaticity(self._own[light]) @ DIRECTIONS.T
+        lamp = colour.chromaticity(self._own[light]) @ colour.DIRECTIONS.T
         cooler = lamp + COOL_OVERSHOOT * np.maximum(needed - lamp, 0)
         cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
         own_reach = np.maximum(self._reach[light], cooler)
@@ -205,13 +200,13 @@ class Gamuts:
         whites = np.maximum(own_reach, self._whites + off_white)
         return np.asarray(np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites))
 
-    def _hull(self, light: int, reach: Doubles) -> ColorHull:
+    def _hull(self, light: int, reach: Doubles) -> colour.ColorHull:
         """Return the gamut of a reach, (k,): the same object as before where it is equal."""
         reach = np.round(reach / REACH_STEP) * REACH_STEP
         former = self._former_gamuts.get(light)
         if former is not None and np.array_equal(former.reach, reach):
             return former
-        return ColorHull(reach, self._own[light])
+        return colour.ColorHull(reach, self._own[light])
 
     def refresh(self) -> None:
         """Discard gamuts, which are computed again on request. Equal ones stay the same objects."""
@@ -224,7 +219,7 @@ class Gamuts:
         """
         colors = weights[lights]
         room = np.einsum("mkc,mc->mk", self._sides[lights], colors)
-        is_inside = (room >= -ROUND_OFF * colors.sum(axis=1, keepdims=True)).all(axis=1)
+        is_inside = (room >= -colour.ROUND_OFF * colors.sum(axis=1, keepdims=True)).all(axis=1)
         is_inside |= self._exempt[lights]
         return [k for k in lights[~is_inside].tolist() if not self[k].has(weights[k])]
 
@@ -235,7 +230,7 @@ class GamutsOfSome(Gamuts):
     def __init__(self, gamuts: Gamuts, lights: Indices) -> None:
         self._whole, self._lights = gamuts, lights
 
-    def __getitem__(self, light: int) -> ColorHull:
+    def __getitem__(self, light: int) -> colour.ColorHull:
         return self._whole[int(self._lights[light])]
 
     def refresh(self) -> None:
@@ -268,24 +263,28 @@ class _NeededLight:
         """Compute it for lamps with these ‖Φᵢ‖² and current weights, (n, 3); one that is off is
         faint.
         """
-        size, now = np.sqrt(power.sum(axis=1)), np.asarray(luminance(current))
+        size, now = np.sqrt(power.sum(axis=1)), np.asarray(colour.luminance(current))
         faint = FAINT_BRIGHTNESS * (now * size).mean() / np.where(size > 0, size, np.inf)
         lamps = np.where(now[:, None] > 0, current / np.where(now > 0, now, 1)[:, None], 1.0)
         lit = (np.maximum(now, faint)[:, None] * lamps)[:, None] * light.rows
-        look, brightness = lit.sum(axis=0), np.asarray(luminance(light.image))
-        dark = DARK_SHARE * np.percentile(luminance(look), 95) if len(look) else 0.0
+        look, brightness = lit.sum(axis=0), np.asarray(colour.luminance(light.image))
+        dark = DARK_SHARE * np.percentile(colour.luminance(look), 95) if len(look) else 0.0
         counts = (look.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (brightness > dark)
-        share = np.asarray(luminance(lit[:, counts]) / luminance(look[counts]), np.float64)
+        share = np.asarray(
+            colour.luminance(lit[:, counts]) / colour.luminance(look[counts]), np.float64
+        )
         needed = light.image[counts] / look[counts] * (share.T @ lamps)
         # Errors of dim light show more: display values are near the root of light.
         weight = light.weight[counts] * np.sqrt(brightness[counts])
-        along = chromaticity(needed) @ DIRECTIONS.T
+        along = colour.chromaticity(needed) @ colour.DIRECTIONS.T
         # Light that makes up for coloured surfaces was not painted: the paint itself is no greener
         # than that.
         albedo = light.albedo[counts]
         has_albedo = albedo.min(axis=1) > BLACK_ALBEDO
         illumination = light.image[counts][has_albedo] / albedo[has_albedo]
-        along[has_albedo] = np.minimum(along[has_albedo], chromaticity(illumination) @ DIRECTIONS.T)
+        along[has_albedo] = np.minimum(
+            along[has_albedo], colour.chromaticity(illumination) @ colour.DIRECTIONS.T
+        )
         return cls(along, share * weight)
 
     @cached_property
@@ -300,7 +299,7 @@ class _NeededLight:
         """
         sums = np.cumsum(self.share[lamp][self._order], axis=0)
         if not (len(sums) and sums[-1, 0] > 0):
-            return np.full(len(DIRECTIONS), -np.inf)
+            return np.full(len(colour.DIRECTIONS), -np.inf)
         last = np.minimum((sums < (1 - OUTLIER_SHARE) * sums[-1]).sum(axis=0), len(sums) - 1)
-        columns = np.arange(len(DIRECTIONS))
+        columns = np.arange(len(colour.DIRECTIONS))
         return np.asarray(self.reach_by_pixel[self._order[last, columns], columns])

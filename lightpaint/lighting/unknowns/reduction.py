@@ -31,6 +31,7 @@ from lightpaint.lighting.constraints.light_constraints import (
     constraints_on_parts,
     tied_lights,
 )
+from lightpaint.lighting.unknowns import lamp_parts, unknown_blocks
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
     Knob,
@@ -45,21 +46,7 @@ from lightpaint.lighting.unknowns.knobs import (
     tied_knob,
     white_lamp_knob,
 )
-from lightpaint.lighting.unknowns.lamp_parts import (
-    WholeLamps,
-    emission_of_parts,
-    part_lamps,
-    watts_of_fixed,
-    watts_of_unknowns,
-)
 from lightpaint.lighting.unknowns.mixed_lights import MixedLights
-from lightpaint.lighting.unknowns.unknown_blocks import (
-    AlikeBlocks,
-    Block,
-    Entries,
-    KnobGroup,
-    LimitedKnobs,
-)
 
 
 @dataclass(frozen=True)
@@ -285,31 +272,37 @@ class Reduction:
             rows[:, columns] = parts
         least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
         if requirements.watts.any():
-            rows += np.outer(requirements.watts, watts_of_unknowns(self.knobs, self.lamps))
+            rows += np.outer(
+                requirements.watts, lamp_parts.watts_of_unknowns(self.knobs, self.lamps)
+            )
             with_knobs = {light for knob in self.knobs for light in knob.lights}
             fixed = {k: lamp for k, lamp in self.lamps.items() if k not in with_knobs}
-            least -= requirements.watts * watts_of_fixed(self.fixed_weights, fixed)
+            least -= requirements.watts * lamp_parts.watts_of_fixed(self.fixed_weights, fixed)
         return rows, least
 
     @cached_property
-    def limited_knobs(self) -> tuple[LimitedKnobs, ...]:
+    def limited_knobs(self) -> tuple[unknown_blocks.LimitedKnobs, ...]:
         """The limited knobs, grouped by their number of unknowns."""
         sizes = {len(knob.unknowns) for knob in self.knobs if knob.limit is not None}
-        return tuple(LimitedKnobs.of(self.knobs, self.places, size) for size in sorted(sizes))
+        return tuple(
+            unknown_blocks.LimitedKnobs.of(self.knobs, self.places, size) for size in sorted(sizes)
+        )
 
     @cached_property
-    def knob_groups(self) -> tuple[KnobGroup, ...]:
+    def knob_groups(self) -> tuple[unknown_blocks.KnobGroup, ...]:
         """The knobs, grouped by their numbers of unknowns and lights."""
         by_size: dict[tuple[int, int], list[int]] = {}
         for k, knob in enumerate(self.knobs):
             by_size.setdefault((len(knob.unknowns), len(knob.lights)), []).append(k)
         return tuple(
-            KnobGroup.of([self.knobs[k] for k in numbers], [self.places[k] for k in numbers])
+            unknown_blocks.KnobGroup.of(
+                [self.knobs[k] for k in numbers], [self.places[k] for k in numbers]
+            )
             for numbers in by_size.values()
         )
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[unknown_blocks.Block, ...]:
         """A block for every set of channels that the unknowns couple."""
         unknown, light, rgb = self.columns
         blocks = []
@@ -321,14 +314,18 @@ class Reduction:
             for c in channels:
                 is_entry = rgb[:, c] != 0
                 columns, first = np.unique(place[unknown[is_entry]], return_index=True)
-                entries.append(Entries(columns, light[is_entry], rgb[is_entry, c], first))
+                entries.append(
+                    unknown_blocks.Entries(columns, light[is_entry], rgb[is_entry, c], first)
+                )
             in_block = set(members.tolist())
             cap_indices = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in in_block]
             caps = tuple(
                 replace(cap, unknowns=tuple(int(place[i]) for i in cap.unknowns))
                 for cap in (self.caps[k] for k in cap_indices)
             )
-            blocks.append(Block(channels, members, tuple(entries), caps, cap_indices))
+            blocks.append(
+                unknown_blocks.Block(channels, members, tuple(entries), caps, cap_indices)
+            )
         return tuple(blocks)
 
     @cached_property
@@ -342,7 +339,7 @@ class Reduction:
         return MixedLights.of(self.knob_groups, (self.lower, self.upper), self.columns)
 
     @cached_property
-    def alike_blocks(self) -> AlikeBlocks | None:
+    def alike_blocks(self) -> unknown_blocks.AlikeBlocks | None:
         """The three blocks together, if they have the same lights and nothing joins them."""
         if len(self.blocks) < 3 or self.caps or not all(block.is_plain for block in self.blocks):
             return None
@@ -351,7 +348,7 @@ class Reduction:
             return None
         unknowns = np.stack([block.unknowns for block in self.blocks])
         is_all_lights = np.array_equal(first, np.arange(len(self.fixed_weights)))
-        return AlikeBlocks(
+        return unknown_blocks.AlikeBlocks(
             None if is_all_lights else first, unknowns, self.lower[unknowns], self.upper[unknowns]
         )
 
@@ -470,7 +467,7 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
     """Return the unknowns among lights, of which some may be emitters of a lamp, without
     requirements.
     """
-    whole = WholeLamps.of(lights)
+    whole = lamp_parts.WholeLamps.of(lights)
     if not whole.has_parts:
         return _reduce_to(constraints, lights)
     of_emitters, of_lamps = constraints_on_parts(constraints, lights)
@@ -482,7 +479,10 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
     _check_ties(constraints, lights)
     whole.check_emitters(lights, lamps)
     colored = [
-        replace(light, emission=as_rgb(emission_of_parts([lights[i] for i in parts], lamps[k])))
+        replace(
+            light,
+            emission=as_rgb(lamp_parts.emission_of_parts([lights[i] for i in parts], lamps[k])),
+        )
         if k in lamps
         else light
         for k, (light, parts) in enumerate(zip(whole.lights, whole.parts, strict=True))
@@ -496,7 +496,7 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
     of_parts = {
         i: part
         for k, lamp in lamps.items()
-        for i, part in zip(whole.parts[k], part_lamps(lamp), strict=True)
+        for i, part in zip(whole.parts[k], lamp_parts.part_lamps(lamp), strict=True)
     }
     reduction = Reduction(np.concatenate(fixed), tuple(labels), tuple(knobs), lamps=of_parts)
     return _with_constrained_parts(reduction, of_emitters, lights)

@@ -16,21 +16,13 @@ from typing import Literal
 
 import numpy as np
 
+from lightpaint import photometry
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis import Lights
 from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.photometry import (
-    LARGEST_ERROR,
-    NORMAL_95,
-    Illuminance,
-    LightCase,
-    MeasuringPlane,
-    PowerBudget,
-    relative_intervals,
-)
 
 #: What a wish is about.
 Kind = Literal["mean", "uniformity", "max", "ratio", "power"]
@@ -71,7 +63,7 @@ class LitCase:
     weights: Doubles
 
     @classmethod
-    def of(cls, case: LightCase, lights: Lights) -> "LitCase":
+    def of(cls, case: photometry.LightCase, lights: Lights) -> "LitCase":
         """Return a case on `lights`. Raises ConstraintError if it names none."""
         found = dict[int, float]()
         for name, factor in case.factors.items():
@@ -103,7 +95,7 @@ class WishedLight:
     illuminance: that is wished for. cases: in which it is; none for the light of the scene alone.
     """
 
-    illuminance: Illuminance
+    illuminance: photometry.Illuminance
     wishes: tuple[LightWish, ...]
     requirements: Requirements
     cases: tuple[LitCase, ...] = ()
@@ -126,12 +118,12 @@ class WishedLight:
 
 
 def wished_light(
-    illuminance: Illuminance,
-    budget: PowerBudget,
+    illuminance: photometry.Illuminance,
+    budget: photometry.PowerBudget,
     reduction: Reduction,
     *,
     floor_m2: float = 0.0,
-    cases: Sequence[LightCase] = (),
+    cases: Sequence[photometry.LightCase] = (),
 ) -> WishedLight:
     """Return the wishes for the planes of `illuminance`, and the budget.
 
@@ -155,7 +147,10 @@ def wished_light(
 
 
 def _add_wishes(
-    rows: "_Rows", plane: MeasuringPlane, illuminance: Illuminance, weights: Doubles
+    rows: "_Rows",
+    plane: photometry.MeasuringPlane,
+    illuminance: photometry.Illuminance,
+    weights: Doubles,
 ) -> None:
     """Add the rows of a plane's wishes. weights: (n, 3), at which noise counts."""
     part, name, wishes = illuminance.points_of(plane.name), plane.name, plane.wishes
@@ -167,9 +162,9 @@ def _add_wishes(
         )
     mean = matrix.mean(axis=0, keepdims=True)
     values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
-    point_error = relative_intervals(values, errors)[:, None, None]
+    point_error = photometry.relative_intervals(values, errors)[:, None, None]
     mean_error = reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
-    sure_mean = mean * (1 - min(mean_error, NORMAL_95 * LARGEST_ERROR))
+    sure_mean = mean * (1 - min(mean_error, photometry.NORMAL_95 * photometry.LARGEST_ERROR))
     size = wishes.mean or max(reading.mean, 1e-9)
     if wishes.mean is not None:
         rows.add("mean", name, wishes.mean, sure_mean, wishes.mean, size=wishes.mean)
@@ -185,7 +180,7 @@ def _add_wishes(
         rows.add("ratio", name, ratio.at_least, above, 0.0, size=size, to=ratio.to)
 
 
-def lit_case(case: LightCase, lights: Lights, reduction: Reduction) -> LitCase:
+def lit_case(case: photometry.LightCase, lights: Lights, reduction: Reduction) -> LitCase:
     """Return a case on `lights`. Raises ConstraintError if it names none, or an adjusted one."""
     lit = LitCase.of(case, lights)
     movable = {light for knob in reduction.knobs for light in knob.lights}
@@ -241,7 +236,7 @@ class _Rows:
         return Requirements(rows, watts, least)
 
 
-def brightest(reduction: Reduction, illuminance: Illuminance) -> Doubles:
+def brightest(reduction: Reduction, illuminance: photometry.Illuminance) -> Doubles:
     """Return the weights (n, 3) of all lights at full; the weights of the scene where nothing
     limits them.
     """
@@ -249,7 +244,7 @@ def brightest(reduction: Reduction, illuminance: Illuminance) -> Doubles:
     return np.where(np.isfinite(high), high, illuminance.lights.current_weights)
 
 
-def watts_allowed(budget: PowerBudget, floor_m2: float) -> float | None:
+def watts_allowed(budget: photometry.PowerBudget, floor_m2: float) -> float | None:
     """Return the power that a budget allows, in watts; None without one."""
     limits = [] if budget.watts is None else [budget.watts]
     if budget.per_area is not None:
@@ -278,7 +273,9 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
         )
 
 
-def _other_plane(illuminance: Illuminance, plane: MeasuringPlane, to: str) -> slice:
+def _other_plane(
+    illuminance: photometry.Illuminance, plane: photometry.MeasuringPlane, to: str
+) -> slice:
     names = [x.name for x in illuminance.planes]
     if to not in names:
         raise ConstraintError(

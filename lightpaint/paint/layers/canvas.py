@@ -15,6 +15,7 @@ from lightpaint.basis import Basis, as_halves
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting import LiveView
+from lightpaint.paint.layers import layer_pixels
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
 from lightpaint.paint.layers.composition import (
     MAX_LIGHT,
@@ -23,14 +24,6 @@ from lightpaint.paint.layers.composition import (
     compose_layer,
     effect_of,
     gradient_pixels,
-)
-from lightpaint.paint.layers.layer_pixels import (
-    SELECTION_ID,
-    LayerPixels,
-    enclosing,
-    is_empty,
-    relative,
-    shared,
 )
 from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
@@ -61,16 +54,16 @@ class OpenStroke:
         """Return whether the stroke has touched anything."""
         return bool(self._before)
 
-    def touch(self, region: Region, layer: LayerPixels) -> None:
+    def touch(self, region: Region, layer: layer_pixels.LayerPixels) -> None:
         """Save the pixels of a region of a layer, which is about to change there."""
-        if is_empty(region):
+        if layer_pixels.is_empty(region):
             return
         for square in _squares(region, layer.size):
             if square not in self._before:
                 self._before[square] = None if layer.is_empty_in(square) else layer.part(square)
-        self.region = enclosing([self.region, region])
+        self.region = layer_pixels.enclosing([self.region, region])
 
-    def pixels_before(self, layer: LayerPixels) -> Pixels:
+    def pixels_before(self, layer: layer_pixels.LayerPixels) -> Pixels:
         """Return the pixels in `region` before the stroke. layer: the current one."""
         before = layer.part(self.region)
         marks = before.at_least
@@ -78,9 +71,9 @@ class OpenStroke:
         if marks is None and any(x is not None for x in saved_marks):
             marks = np.zeros(before.image.shape, bool)
         for square, pixels in self._before.items():
-            area = shared(square, self.region)
-            to = slices(relative(area, self.region))
-            saved = None if pixels is None else pixels.part(relative(area, square))
+            area = layer_pixels.shared(square, self.region)
+            to = slices(layer_pixels.relative(area, self.region))
+            saved = None if pixels is None else pixels.part(layer_pixels.relative(area, square))
             before.image[to] = 0 if saved is None else saved.image
             before.importance[to] = 0 if saved is None else saved.importance
             if marks is not None:
@@ -134,9 +127,9 @@ class Canvas:
             patch
             for step in steps
             for patch in step.patches
-            if patch.layer == SELECTION_ID and patch.view == self.view
+            if patch.layer == layer_pixels.SELECTION_ID and patch.view == self.view
         ]
-        self.selection = LayerPixels.replayed(self.basis.size, masks)
+        self.selection = layer_pixels.LayerPixels.replayed(self.basis.size, masks)
         albedo = _albedo_source(self.basis)
         self._layers = ComposedLayers(self.view, current, layers, steps, stored, albedo)
         self.live = self._live_view()
@@ -225,7 +218,7 @@ class Canvas:
         """True while a stroke is open."""
         return any(self._open_strokes.values())
 
-    def layer(self, number: int) -> LayerPixels:
+    def layer(self, number: int) -> layer_pixels.LayerPixels:
         """Return the pixels of a layer. Raises PaintError if there is none."""
         return self._layers.layer(number)
 
@@ -286,7 +279,7 @@ class Canvas:
 
     def _follow(self, change: Change) -> None:
         """Update the sums after a change of the target."""
-        if not is_empty(change.region):
+        if not layer_pixels.is_empty(change.region):
             area = slices(change.region)
             self.live.update(area, with_importance=change.with_importance)
 
@@ -294,7 +287,7 @@ class Canvas:
         """Drop the open strokes, and return their region."""
         for number, stroke in self._open_strokes.items():
             self.put(number, stroke.region, stroke.pixels_before(self.layer(number)))
-        region = enclosing([stroke.region for stroke in self._open_strokes.values()])
+        region = layer_pixels.enclosing([stroke.region for stroke in self._open_strokes.values()])
         self.close()
         return region
 
@@ -310,7 +303,7 @@ class Canvas:
                 after = _with_marks(after, before)
                 self.put(number, region, after)
             # A page that lost the answer to a stroke sends it again, which changes nothing.
-            if not is_empty(region) and not before.equals(after):
+            if not layer_pixels.is_empty(region) and not before.equals(after):
                 patches.append(Patch(region, before, after, self.view, number))
         return patches
 
@@ -398,7 +391,7 @@ class ViewLayers:
     """
 
     layers: LayerStack
-    pixels: Mapping[int, LayerPixels]
+    pixels: Mapping[int, layer_pixels.LayerPixels]
     current: Floats
     albedo: Floats | None = None
 
@@ -408,7 +401,7 @@ class ViewLayers:
         pixels = {
             number: canvas.layer(number).copy()
             for number in layers.ids
-            if not is_empty(canvas.layer(number).bounds)
+            if not layer_pixels.is_empty(canvas.layer(number).bounds)
         }
         has_gradient = any(layer.gradient is not None for layer in layers)
         return cls(layers, pixels, canvas.current, canvas.albedo if has_gradient else None)
@@ -429,9 +422,9 @@ class ViewLayers:
         groups = {layer.id: layer for layer in self.layers if layer.kind == "group"}
         below = Pixels.unpainted(np.array(self.current[top:bottom], np.float32))
         for layer in self.layers:
-            own = self.pixels.get(layer.id, LayerPixels(self.size))
-            region = shared(own.bounds, part)
-            region = (top, top, 0, 0) if is_empty(region) else region
+            own = self.pixels.get(layer.id, layer_pixels.LayerPixels(self.size))
+            region = layer_pixels.shared(own.bounds, part)
+            region = (top, top, 0, 0) if layer_pixels.is_empty(region) else region
             pixels = own.part(region)
             group = groups.get(layer.id if layer.group is None else layer.group)
             strength, is_shown = layer.strength, layer.is_visible
@@ -439,13 +432,13 @@ class ViewLayers:
                 strength = min(MAX_STRENGTH, strength * group.strength)
                 is_shown &= group.is_visible
             effective = replace(effect_of(layer), strength=strength)
-            inner = relative(region, part)
+            inner = layer_pixels.relative(region, part)
             shown, area = pixels, below.part(inner)
             if layer.gradient is not None:
                 shown = gradient_pixels(layer.gradient, pixels.importance, region, self.albedo)
             light, coverage, opacity = _appearance(effective, shown, area.image)
             yield LayerPicture(layer, region, pixels, light, coverage, opacity)
-            if is_shown and strength > 0 and not is_empty(region):
+            if is_shown and strength > 0 and not layer_pixels.is_empty(region):
                 below.image[slices(inner)] = compose_layer(effective, shown, area).image
 
 

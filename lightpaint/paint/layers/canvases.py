@@ -11,23 +11,8 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting import LiveView
+from lightpaint.paint.layers import layer_pixels, layer_stack
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.layers.layer_pixels import (
-    SELECTION_ID,
-    LayerPixels,
-    enclosing,
-    is_empty,
-    put_selection,
-)
-from lightpaint.paint.layers.layer_stack import (
-    PAINTING,
-    PAINTING_ID,
-    Layer,
-    LayerStack,
-    StackChange,
-    next_layer_id,
-    stack_after,
-)
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, name_in_view
 from lightpaint.paint.store.session_file import StoredComposition
 
@@ -50,8 +35,8 @@ class Canvases:
         stored: Sequence[StoredComposition] | None = None,
     ) -> None:
         """Open the canvases after some steps. stored: their compositions, if they are known."""
-        self.layers = self._layers_at_rest = stack_after(steps)
-        self.next_layer = next_layer_id(steps)
+        self.layers = self._layers_at_rest = layer_stack.stack_after(steps)
+        self.next_layer = layer_stack.next_layer_id(steps)
         self._canvases = tuple(
             Canvas(k, basis, current, self.layers, steps, stored[k] if stored else None)
             for k, (basis, current) in enumerate(zip(bases, current_looks, strict=True))
@@ -76,7 +61,7 @@ class Canvases:
 
     def rebuild(self, steps: Sequence[Step]) -> None:
         """Continue with the layers and pixels after these steps; what is open is dropped."""
-        self.layers = self._layers_at_rest = stack_after(steps)
+        self.layers = self._layers_at_rest = layer_stack.stack_after(steps)
         for view in self:
             view.rebuild(self.layers, steps)
 
@@ -105,7 +90,7 @@ class Canvases:
         """True while a stroke, or a change of the layers, is open."""
         return self.layers != self._layers_at_rest or any(view.is_open for view in self)
 
-    def open_layers(self, layers: LayerStack) -> None:
+    def open_layers(self, layers: layer_stack.LayerStack) -> None:
         """Show other layers until the change is closed or dropped. Raises PaintError for an id
         that another layer had.
         """
@@ -129,18 +114,18 @@ class Canvases:
         """Copy the pixels of a layer into a new one that is shown already: open strokes."""
         for view in self:
             pixels = view.layer(source)
-            if not is_empty(pixels.bounds):
+            if not layer_pixels.is_empty(pixels.bounds):
                 view.paint(number, pixels.bounds, pixels.part(pixels.bounds))
 
     def clear_painting(self) -> None:
         """Clear the painting that names no layer, which is always there: open strokes."""
         for view in self:
-            top, bottom, left, right = bounds = view.layer(PAINTING.id).bounds
-            if not is_empty(bounds):
+            top, bottom, left, right = bounds = view.layer(layer_stack.PAINTING.id).bounds
+            if not layer_pixels.is_empty(bounds):
                 empty = Pixels.unpainted(np.zeros((bottom - top, right - left, 3), np.float32))
-                view.paint(PAINTING.id, bounds, empty)
+                view.paint(layer_stack.PAINTING.id, bounds, empty)
 
-    def open_change(self) -> tuple[StackChange, tuple[Patch, ...]]:
+    def open_change(self) -> tuple[layer_stack.StackChange, tuple[Patch, ...]]:
         """Return the open change of the layers, and the changes of open strokes on them."""
         patches = tuple(patch for view in self for patch in view.stroke_patches())
         kept = tuple(patch for patch in patches if patch.layer in self.layers.ids)
@@ -159,12 +144,12 @@ class Canvases:
         regions = [view.drop() for view in self]
         self.layers = self._layers_at_rest
         shown = [view.show(self.layers) for view in self]
-        both = [enclosing(pair) for pair in zip(regions, shown, strict=True)]
-        return [(k, region) for k, region in enumerate(both) if not is_empty(region)]
+        both = [layer_pixels.enclosing(pair) for pair in zip(regions, shown, strict=True)]
+        return [(k, region) for k, region in enumerate(both) if not layer_pixels.is_empty(region)]
 
     def move(
         self,
-        layers: LayerStack,
+        layers: layer_stack.LayerStack,
         patches: Sequence[Patch],
         steps: Sequence[Step],
         *,
@@ -175,8 +160,8 @@ class Canvases:
         steps: the steps done at that point, from which returning layers get their pixels.
         """
         for patch in patches:
-            if patch.layer == SELECTION_ID:
-                put_selection(self[patch.view].selection, patch, is_back=is_back)
+            if patch.layer == layer_pixels.SELECTION_ID:
+                layer_pixels.put_selection(self[patch.view].selection, patch, is_back=is_back)
             elif patch.layer in self.layers.ids:
                 pixels = patch.before if is_back else patch.after
                 self[patch.view].put(patch.layer, patch.region, pixels)
@@ -187,17 +172,19 @@ class Canvases:
             put = [
                 patch.region
                 for patch in patches
-                if patch.view == view.view and patch.layer != SELECTION_ID
+                if patch.view == view.view and patch.layer != layer_pixels.SELECTION_ID
             ]
-            region = enclosing([view.show(layers, steps), *put])
-            if not is_empty(region):
+            region = layer_pixels.enclosing([view.show(layers, steps), *put])
+            if not layer_pixels.is_empty(region):
                 regions.append((view.view, region))
         return regions
 
     def repeat(self, further: Sequence[Step], steps: Sequence[Step]) -> None:
         """Go to the state after further steps. steps: all until then."""
-        self.move(stack_after(steps), [x for step in further for x in step.patches], steps)
-        self.next_layer = next_layer_id(steps)
+        self.move(
+            layer_stack.stack_after(steps), [x for step in further for x in step.patches], steps
+        )
+        self.next_layer = layer_stack.next_layer_id(steps)
 
     def replacement_patches(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
         """Return the patches that replace all layers by these paintings, by view.
@@ -205,13 +192,13 @@ class Canvases:
         A view without one keeps the composition of its layers.
         """
         patches, whole = [], dict(paintings)
-        if self.layers != LayerStack():
+        if self.layers != layer_stack.LayerStack():
             whole = {k: view.pixels(view.full_region) for k, view in enumerate(self)} | whole
         for k, (image, importance, at_least) in whole.items():
             view = self[k]
             light, counts = np.asarray(image, np.float32), np.asarray(importance, np.float32)
             pixels = Pixels(light, counts, at_least).copy()
-            before = view.layer(PAINTING.id).part(view.full_region)
+            before = view.layer(layer_stack.PAINTING.id).part(view.full_region)
             patches.append(Patch(view.full_region, before, pixels, k))
         return tuple(patches)
 
@@ -224,7 +211,7 @@ class LayeredPaintings:
     replace all layers. source: digest of the file that they are from; "" for none.
     """
 
-    layers: LayerStack
+    layers: layer_stack.LayerStack
     pixels: Mapping[tuple[int, int], tuple[Region, Pixels]]
     view: int | None = None
     source: str = ""
@@ -236,18 +223,18 @@ class LayeredPaintings:
         for view in views:
             for number in views.layers.ids:
                 layer = view.layer(number)
-                if not is_empty(bounds := layer.bounds):
+                if not layer_pixels.is_empty(bounds := layer.bounds):
                     pixels[view.view, number] = bounds, layer.part(bounds)
         return cls(views.layers, pixels)
 
     def new_ids(self, views: Canvases) -> dict[int, int]:
         """Return the ids in `views` of the layers that replace all others, by their own."""
-        ids = {PAINTING_ID: PAINTING_ID}
+        ids = {layer_stack.PAINTING_ID: layer_stack.PAINTING_ID}
         for layer in self.layers:
             ids.setdefault(layer.id, views.next_layer - 1 + len(ids))
         return ids
 
-    def patches(self, views: Canvases) -> tuple[LayerStack, tuple[Patch, ...]]:
+    def patches(self, views: Canvases) -> tuple[layer_stack.LayerStack, tuple[Patch, ...]]:
         """Return the layers under new ids in `views`, and the patches that create them."""
         if self.view is not None:
             return self._patches_on_top(views, self.view)
@@ -257,23 +244,28 @@ class LayeredPaintings:
         ]
         patches = []
         for (view, number), (region, pixels) in self.pixels.items():
-            if number != PAINTING_ID and view < len(views):
+            if number != layer_stack.PAINTING_ID and view < len(views):
                 patches.append(Patch(region, _no_pixels(pixels), pixels, view, ids[number]))
         for canvas in views:
             # The layer of paint without an id exists already, with other pixels.
-            painting, after = canvas.layer(PAINTING_ID), LayerPixels(canvas.size)
-            if (canvas.view, PAINTING_ID) in self.pixels:
-                after.put(*self.pixels[canvas.view, PAINTING_ID])
-            bounds = enclosing([painting.bounds, after.bounds])
-            if not is_empty(bounds):
+            painting, after = (
+                canvas.layer(layer_stack.PAINTING_ID),
+                layer_pixels.LayerPixels(canvas.size),
+            )
+            if (canvas.view, layer_stack.PAINTING_ID) in self.pixels:
+                after.put(*self.pixels[canvas.view, layer_stack.PAINTING_ID])
+            bounds = layer_pixels.enclosing([painting.bounds, after.bounds])
+            if not layer_pixels.is_empty(bounds):
                 before, then = painting.part(bounds), after.part(bounds)
                 patches.append(Patch(bounds, before, then, canvas.view))
-        return LayerStack.of(renamed), tuple(patches)
+        return layer_stack.LayerStack.of(renamed), tuple(patches)
 
-    def _patches_on_top(self, views: Canvases, view: int) -> tuple[LayerStack, tuple[Patch, ...]]:
+    def _patches_on_top(
+        self, views: Canvases, view: int
+    ) -> tuple[layer_stack.LayerStack, tuple[Patch, ...]]:
         """Return all layers of `views` with these on top, and the patches that create them."""
         numbers = {number for _, number in self.pixels}
-        added = [x for x in self.layers if x.id != PAINTING_ID or x.id in numbers]
+        added = [x for x in self.layers if x.id != layer_stack.PAINTING_ID or x.id in numbers]
         ids = {layer.id: views.next_layer + k for k, layer in enumerate(added)}
         renamed = [
             replace(x, id=ids[x.id], group=None if x.group is None else ids[x.group]) for x in added
@@ -282,7 +274,7 @@ class LayeredPaintings:
             Patch(region, _no_pixels(pixels), pixels, view, ids[number])
             for (_, number), (region, pixels) in self.pixels.items()
         ]
-        return LayerStack.of([*views.layers, *renamed]), tuple(patches)
+        return layer_stack.LayerStack.of([*views.layers, *renamed]), tuple(patches)
 
     def as_fields(self) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
         """Return JSON and arrays, which `from_fields` reads."""
@@ -305,7 +297,9 @@ class LayeredPaintings:
     ) -> "LayeredPaintings":
         """Return what `as_fields` wrote. Raises PaintError for something else."""
         try:
-            layers = LayerStack.of(Layer.of(data) for data in fields["stack"])
+            layers = layer_stack.LayerStack.of(
+                layer_stack.Layer.of(data) for data in fields["stack"]
+            )
             pixels, names = {}, set(arrays)
             for key, region in fields["regions"].items():
                 number, _, view = key.partition("@")

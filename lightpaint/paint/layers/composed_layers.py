@@ -14,6 +14,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Floats
 from lightpaint.errors import PaintError
 from lightpaint.images import block_sums
+from lightpaint.paint.layers import layer_pixels
 from lightpaint.paint.layers.composition import (
     AlbedoSource,
     GradientPixels,
@@ -22,13 +23,6 @@ from lightpaint.paint.layers.composition import (
     compose_importance,
     compose_over,
     with_effect,
-)
-from lightpaint.paint.layers.layer_pixels import (
-    TILE_SIDE,
-    LayerPixels,
-    LayerSummary,
-    enclosing,
-    is_empty,
 )
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
@@ -74,15 +68,17 @@ class LowerLayers:
         if revised != self._layers:
             height, width = self.current.shape[:2]
             self._layers, self._pixels = revised, Pixels.unpainted(self.current.copy())
-            self._is_known = np.zeros((-(-height // TILE_SIDE), -(-width // TILE_SIDE)), bool)
+            self._is_known = np.zeros(
+                (-(-height // layer_pixels.TILE_SIDE), -(-width // layer_pixels.TILE_SIDE)), bool
+            )
         self._complete(layers, region)
 
     def _complete(self, layers: Sequence[ShownLayer], region: Region) -> None:
         """Compose the cells of a region that are not known yet."""
         top, bottom, left, right = region
         height, width = self.current.shape[:2]
-        rows = slice(top // TILE_SIDE, -(-bottom // TILE_SIDE))
-        columns = slice(left // TILE_SIDE, -(-right // TILE_SIDE))
+        rows = slice(top // layer_pixels.TILE_SIDE, -(-bottom // layer_pixels.TILE_SIDE))
+        columns = slice(left // layer_pixels.TILE_SIDE, -(-right // layer_pixels.TILE_SIDE))
         unknown = ~self._is_known[rows, columns]
         if not unknown.any():
             return
@@ -91,8 +87,8 @@ class LowerLayers:
         above, below = rows.start + int(ys[0]), rows.start + int(ys[-1]) + 1
         start, end = columns.start + int(xs[0]), columns.start + int(xs[-1]) + 1
         block = (
-            *(above * TILE_SIDE, min(below * TILE_SIDE, height)),
-            *(start * TILE_SIDE, min(end * TILE_SIDE, width)),
+            *(above * layer_pixels.TILE_SIDE, min(below * layer_pixels.TILE_SIDE, height)),
+            *(start * layer_pixels.TILE_SIDE, min(end * layer_pixels.TILE_SIDE, width)),
         )
         area = slices(block)
         on_look = Pixels.unpainted(np.array(self.current[area], np.float32))
@@ -146,16 +142,19 @@ class ComposedLayers:
         self.current = np.asarray(current, np.float32)
         height, width = self.current.shape[:2]
         self.size = height, width
-        known: Mapping[int, LayerSummary] = {}
+        known: Mapping[int, layer_pixels.LayerSummary] = {}
         if stored is not None:
-            known = {number: LayerSummary(*values) for number, values in stored.layers.items()}
+            known = {
+                number: layer_pixels.LayerSummary(*values)
+                for number, values in stored.layers.items()
+            }
         patches = _patches_by_layer(steps, view)
         self._pixels = {
-            number: LayerPixels.stored(
+            number: layer_pixels.LayerPixels.stored(
                 self.size, patches.get(number, ()), known[number], self._doubt
             )
             if number in known
-            else LayerPixels.replayed(self.size, patches.get(number, ()))
+            else layer_pixels.LayerPixels.replayed(self.size, patches.get(number, ()))
             for number in layers.ids
         }
         self._shown = self._with_accents(layers)
@@ -172,7 +171,7 @@ class ComposedLayers:
         """Region of the whole view."""
         return (0, self.size[0], 0, self.size[1])
 
-    def layer(self, number: int) -> LayerPixels:
+    def layer(self, number: int) -> layer_pixels.LayerPixels:
         """Return the pixels of a layer. Raises PaintError if there is none."""
         if number not in self._pixels:
             raise PaintError(f"there is no layer {number}")
@@ -216,7 +215,7 @@ class ComposedLayers:
         if side > 1 and key in self._coverages and self._coverages[key][0] == (shown, revision):
             return self._coverages[key][1]
         coverage = np.zeros(self.size, np.float32)
-        if not is_empty(bounds := shown.pixels.bounds):
+        if not layer_pixels.is_empty(bounds := shown.pixels.bounds):
             coverage[slices(bounds)] = np.minimum(shown.pixels.coverage(bounds), 1)
         if side > 1:
             pixels = block_sums(np.ones(self.size, np.float32), side)
@@ -258,7 +257,9 @@ class ComposedLayers:
         missing = set(layers.ids) - set(self._pixels)
         patches = _patches_by_layer(steps, self._view) if missing and steps else {}
         for number in missing:
-            self._pixels[number] = LayerPixels.replayed(self.size, patches.get(number, ()))
+            self._pixels[number] = layer_pixels.LayerPixels.replayed(
+                self.size, patches.get(number, ())
+            )
         before = self._shown
         self._stack = layers
         self._shown = self._with_accents(layers, None if at_rest else before)
@@ -272,7 +273,9 @@ class ComposedLayers:
         if _without_accents(before) == _without_accents(self._shown):
             bands = [band for shown in changed for band in shown.pixels.bands]
             return self._compose_importance(bands, same_below)
-        return self._compose(enclosing([shown.pixels.bounds for shown in changed]), same_below)
+        return self._compose(
+            layer_pixels.enclosing([shown.pixels.bounds for shown in changed]), same_below
+        )
 
     def _with_accents(
         self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
@@ -292,7 +295,7 @@ class ComposedLayers:
 
         start: number of visible layers, the lowest ones, that have not changed.
         """
-        if is_empty(region):
+        if layer_pixels.is_empty(region):
             return Change(region)
         below = self._lower.part(self._shown[:start], region)
         image, importance, at_least = compose_over(self._shown[start:], below, region)
@@ -315,7 +318,7 @@ class ComposedLayers:
         """
         changed_regions = []
         for top in {band[0] for band in bands}:
-            region = enclosing([band for band in bands if band[0] == top])
+            region = layer_pixels.enclosing([band for band in bands if band[0] == top])
             below = self._lower.importance(self._shown[:start], region)
             importance = compose_importance(self._shown[start:], below, region)
             if self._is_doubtful:
@@ -323,8 +326,8 @@ class ComposedLayers:
             target = self.target.importance[slices(region)]
             changed_regions.append(_bounds_of(importance != target, region))
             target[...] = importance
-        region = enclosing(changed_regions)
-        return Change(region, with_importance=not is_empty(region))
+        region = layer_pixels.enclosing(changed_regions)
+        return Change(region, with_importance=not layer_pixels.is_empty(region))
 
     def _doubt(self) -> None:
         """Note that a layer was not as its stored composition had it."""
@@ -350,7 +353,9 @@ def accent(part: float) -> float:
     return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
 
 
-def accents(layers: Sequence[tuple[Layer, LayerPixels | GradientPixels]]) -> list[float]:
+def accents(
+    layers: Sequence[tuple[Layer, layer_pixels.LayerPixels | GradientPixels]],
+) -> list[float]:
     """Return the accent, by which its paint counts more, of each visible layer in one view.
 
     It depends on their coverage alone, and not on when they were made.

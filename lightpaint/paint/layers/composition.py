@@ -16,13 +16,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.colour import LUMINANCE
-from lightpaint.paint.layers.layer_pixels import (
-    MIN_COVERAGE,
-    LayerPixels,
-    is_empty,
-    relative,
-    shared,
-)
+from lightpaint.paint.layers import layer_pixels
 from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
@@ -44,7 +38,9 @@ AlbedoSource = Callable[[], Floats | None]
 class GradientPixels:
     """The pixels of a gradient within its mask, which `compose` uses as the pixels of a layer."""
 
-    def __init__(self, gradient: Gradient, mask: LayerPixels, albedo: AlbedoSource) -> None:
+    def __init__(
+        self, gradient: Gradient, mask: layer_pixels.LayerPixels, albedo: AlbedoSource
+    ) -> None:
         self._values = gradient, mask, albedo
         self._summary: tuple[int, float, bool] | None = None
 
@@ -98,7 +94,7 @@ class GradientPixels:
             least = coverage.min() if coverage.size == height * width else 0
             total = float(np.minimum(coverage, 1).sum(dtype=np.float64))
             mean = total / (height * width)
-            self._summary = mask.revision, mean, bool(least >= MIN_COVERAGE)
+            self._summary = mask.revision, mean, bool(least >= layer_pixels.MIN_COVERAGE)
         return self._summary[1:]
 
 
@@ -108,13 +104,13 @@ class ShownLayer(NamedTuple):
     """
 
     layer: Layer
-    pixels: LayerPixels | GradientPixels
+    pixels: layer_pixels.LayerPixels | GradientPixels
     accent: float
 
 
 def with_effect(
-    layer: Layer, pixels: LayerPixels, albedo: AlbedoSource
-) -> tuple[Layer, LayerPixels | GradientPixels]:
+    layer: Layer, pixels: layer_pixels.LayerPixels, albedo: AlbedoSource
+) -> tuple[Layer, layer_pixels.LayerPixels | GradientPixels]:
     """Return a layer and its pixels as `compose` takes them: a gradient as what it does."""
     if layer.gradient is None:
         return layer, pixels
@@ -145,10 +141,10 @@ def compose_over(layers: Sequence[ShownLayer], below: Pixels, region: Region) ->
     """
     result = below
     for shown in layers:
-        if is_empty(area := shared(shown.pixels.bounds, region)):
+        if layer_pixels.is_empty(area := layer_pixels.shared(shown.pixels.bounds, region)):
             continue
         # A layer changes nothing where it has no pixels, so that small ones cost their area alone.
-        inner = relative(area, region)
+        inner = layer_pixels.relative(area, region)
         pixels, below = shown.pixels.part(area), result.part(inner)
         composed = compose_layer(shown.layer, pixels, below, shown.accent)
         result.image[slices(inner)] = composed.image
@@ -171,9 +167,9 @@ def compose_importance(
     top, bottom, left, right = region
     result = np.zeros((bottom - top, right - left), np.float32) if below is None else below
     for layer, pixels, own_accent in layers:
-        if is_empty(area := shared(pixels.bounds, region)):
+        if layer_pixels.is_empty(area := layer_pixels.shared(pixels.bounds, region)):
             continue
-        inner = slices(relative(area, region))
+        inner = slices(layer_pixels.relative(area, region))
         if _counts_nowhere(layer, result[inner], own_accent):
             continue  # before its coverage is put together
         result[inner] = _counts(layer, pixels.coverage(area), result[inner], own_accent)
@@ -188,7 +184,7 @@ def compose_layer(layer: Layer, pixels: Pixels, below: Pixels, accent: float = 1
         return _replace(layer, pixels, below, counts)
     if layer.kind == "weigh":
         return below._replace(importance=counts)
-    covered = coverage >= np.float32(MIN_COVERAGE)
+    covered = coverage >= np.float32(layer_pixels.MIN_COVERAGE)
     if layer.kind == "paint":
         to, share = pixels.image, coverage * np.float32(layer.strength)
     else:
@@ -207,7 +203,7 @@ def _counts(layer: Layer, coverage: _Array, below: _Array, accent: float) -> _Ar
     factor = np.float32(accent * layer.importance)
     if layer.kind == "pixels":
         return np.where(coverage > 0, coverage * factor, below)
-    covered = coverage >= np.float32(MIN_COVERAGE)
+    covered = coverage >= np.float32(layer_pixels.MIN_COVERAGE)
     if layer.kind == "weigh":
         times = np.float32(layer.times**layer.strength)
         base = np.where(below > 0, below, np.float32(1))

@@ -17,20 +17,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Floats
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats import (
-    TRANSFORM_KEY,
-    PartHead,
-    RasterGroup,
-    RasterLayer,
-    head_of,
-    kind_of,
-    layered_kind,
-    opened_openraster,
-    read_headers,
-    read_parts,
-    write_openraster,
-    write_streamed,
-)
+from lightpaint.images import formats
 from lightpaint.paint.layers.canvas import (
     MAX_IMPORTANCE,
     MAX_PAINTED_LIGHT,
@@ -108,11 +95,11 @@ def write_layers_exr(path: Path, view: ViewLayers, sensor: str) -> None:
     layers = [layer.as_json() | {"layer": names[layer.id]} for layer in view.layers]
     text = json.dumps({"format": FORMAT, "sensor": sensor, "layers": layers}, ensure_ascii=True)
     texts = {KEY: text}
-    parts = [(PartHead("layers", view.size, _kinds(shown(0, 1)), texts), shown)]
+    parts = [(formats.PartHead("layers", view.size, _kinds(shown(0, 1)), texts), shown)]
     if weighted:
-        parts.append((PartHead("importance", view.size, _kinds(numbers(0, 1))), numbers))
+        parts.append((formats.PartHead("importance", view.size, _kinds(numbers(0, 1))), numbers))
     room = sum(len(head.encoded()) + 8 * head.chunks for head, _ in parts) + ROOM_BYTES
-    write_streamed(path, parts, room=room)
+    formats.write_streamed(path, parts, room=room)
 
 
 def _kinds(rows: Mapping[str, _Plane]) -> dict[str, np.dtype[Any]]:
@@ -141,17 +128,19 @@ def write_layers_openraster(
 
     merged: (h, w, 3) linear, the target that they come to.
     """
-    texts = {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}
+    texts = {formats.TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}
     items = _raster_items(view, transform)
-    write_openraster(path, items, transform.encode(merged), texts)
+    formats.write_openraster(path, items, transform.encode(merged), texts)
 
 
 def _raster_items(
     view: ViewLayers, transform: ViewTransform
-) -> Iterator[RasterLayer | RasterGroup]:
+) -> Iterator[formats.RasterLayer | formats.RasterGroup]:
     """Yield what an OpenRaster file shows, the lowest first, one picture after the other."""
     opaque = np.ones((*view.size, 1), np.float32)
-    yield RasterLayer(LOOK_NAME, np.concatenate([transform.encode(view.current), opaque], axis=-1))
+    yield formats.RasterLayer(
+        LOOK_NAME, np.concatenate([transform.encode(view.current), opaque], axis=-1)
+    )
 
     def group_of(picture: LayerPicture) -> int | None:
         return picture.layer.id if picture.layer.kind == "group" else picture.layer.group
@@ -168,7 +157,7 @@ def _raster_items(
             yield from layers
         else:
             group = view.layers[number]
-            yield RasterGroup(group.name, layers, group.is_visible)
+            yield formats.RasterGroup(group.name, layers, group.is_visible)
 
 
 def _numbered(number: int, name: str, count: int) -> str:
@@ -176,10 +165,10 @@ def _numbered(number: int, name: str, count: int) -> str:
     return f"{number:0{max(2, len(str(count + 1)))}} {name}".replace(".", ",")
 
 
-def _raster_layer(picture: LayerPicture, transform: ViewTransform) -> RasterLayer:
+def _raster_layer(picture: LayerPicture, transform: ViewTransform) -> formats.RasterLayer:
     layer, (top, _, left, _) = picture.layer, picture.region
     display = np.concatenate([transform.encode(picture.light), picture.coverage[..., None]], -1)
-    return RasterLayer(layer.name, display, (top, left), picture.opacity, layer.is_visible)
+    return formats.RasterLayer(layer.name, display, (top, left), picture.opacity, layer.is_visible)
 
 
 def _shown_channels(
@@ -222,13 +211,13 @@ def check_kind(path: Path) -> bool:
 
     Raises PaintError or ImageError for any other file.
     """
-    head = head_of(path, HEAD_BYTES)
-    kind = kind_of(head)
-    if kind == "zip" and layered_kind(path, head) == "ora":
+    head = formats.head_of(path, HEAD_BYTES)
+    kind = formats.kind_of(head)
+    if kind == "zip" and formats.layered_kind(path, head) == "ora":
         return False
     if kind != "exr":
         raise PaintError(path, " has no layers to open: expected a .ora file, or layers.exr")
-    if not any(KEY in texts for texts in read_headers(path)[0]):
+    if not any(KEY in texts for texts in formats.read_headers(path)[0]):
         raise PaintError(
             path,
             " does not say what its layers mean, as an EXR saved again by another program: "
@@ -238,11 +227,11 @@ def check_kind(path: Path) -> bool:
 
 
 def _of_exr(path: Path, size: tuple[int, int]) -> LayeredPaintings:
-    texts, file_size = read_headers(path)
+    texts, file_size = formats.read_headers(path)
     _check_size(path, file_size, size)
     try:
         stack, names = _exr_layers(next(each[KEY] for each in texts if KEY in each))
-        parts = [part.in_display_window() for part in read_parts(path)]
+        parts = [part.in_display_window() for part in formats.read_parts(path)]
         channels = {name: pixels for part in parts for name, pixels in part.channels.items()}
         found = _Found(path)
         for layer in stack:
@@ -316,7 +305,7 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
     layers: list[Layer] = []
     found = _Found(path)
 
-    def add(item: RasterLayer, group: int | None = None) -> None:
+    def add(item: formats.RasterLayer, group: int | None = None) -> None:
         number = len(layers) + 1
         region, pixels = _raster_pixels(item, size, transform)
         if pixels.importance.any():
@@ -324,10 +313,10 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
             found.add(number, region, pixels)
 
     try:
-        with opened_openraster(path) as (file_size, items):
+        with formats.opened_openraster(path) as (file_size, items):
             _check_size(path, file_size, size)
             for k, item in enumerate(items):
-                if isinstance(item, RasterGroup):
+                if isinstance(item, formats.RasterGroup):
                     number = len(layers) + 1
                     name = item.name[:MAX_NAME_LENGTH]
                     layers.append(Layer(number, "group", name, is_visible=item.is_visible))
@@ -340,7 +329,7 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
     return LayeredPaintings(LayerStack.of(layers), found.pixels)
 
 
-def _layer(number: int, item: RasterLayer, group: int | None) -> Layer:
+def _layer(number: int, item: formats.RasterLayer, group: int | None) -> Layer:
     return Layer(
         number,
         "paint",
@@ -352,7 +341,7 @@ def _layer(number: int, item: RasterLayer, group: int | None) -> Layer:
 
 
 def _raster_pixels(
-    item: RasterLayer, size: tuple[int, int], transform: ViewTransform
+    item: formats.RasterLayer, size: tuple[int, int], transform: ViewTransform
 ) -> tuple[Region, Pixels]:
     """Return the region of the view that a layer covers, and its pixels there.
 

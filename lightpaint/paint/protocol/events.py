@@ -11,31 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.paint.protocol import message_parts
 from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings, PlanesReading
 from lightpaint.paint.protocol.base import OPTIONAL, Event
-from lightpaint.paint.protocol.message_parts import (
-    Camera,
-    ConsoleInfo,
-    EditState,
-    ImageInfo,
-    LightInfo,
-    LightPlace,
-    LookInfo,
-    Place,
-    PlanesInfo,
-    PlanObject,
-    PresetInfo,
-    ReferenceInfo,
-    RenderInfo,
-    SampleCount,
-    SearchInfo,
-    SkyAxes,
-    StepInfo,
-    TableInfo,
-    Tone,
-    TransformInfo,
-    ViewInfo,
-)
 from lightpaint.paint.protocol.task_events import ProgressReport, VerificationResult
 from lightpaint.paint.store.history_steps import Region
 
@@ -60,7 +38,7 @@ class SessionPending(Event, kind="waiting"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SessionState(EditState, Event, kind="state", is_observed=True):
+class SessionState(message_parts.EditState, Event, kind="state", is_observed=True):
     """The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
     improves. All lists of lights are in the order of `lights`.
 
@@ -88,17 +66,17 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     can_report: bool
     size: tuple[int, int]
     objects: tuple[str, ...]
-    lights: tuple[LightInfo, ...]
-    images: tuple[ImageInfo, ...]
-    views: tuple[ViewInfo, ...]
+    lights: tuple[message_parts.LightInfo, ...]
+    images: tuple[message_parts.ImageInfo, ...]
+    views: tuple[message_parts.ViewInfo, ...]
     transforms: tuple[str, ...]
-    transform: TransformInfo
-    lut: TableInfo
+    transform: message_parts.TransformInfo
+    lut: message_parts.TableInfo
     resources: Mapping[str, int]
-    looks: tuple[LookInfo, ...]
-    presets: tuple[PresetInfo, ...]
-    references: tuple[ReferenceInfo, ...]
-    basis: SampleCount
+    looks: tuple[message_parts.LookInfo, ...]
+    presets: tuple[message_parts.PresetInfo, ...]
+    references: tuple[message_parts.ReferenceInfo, ...]
+    basis: message_parts.SampleCount
     verifications: tuple[VerificationResult, ...]
     is_new: bool
     stroke: int
@@ -107,14 +85,14 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     weights: Doubles
     is_back: bool = True
     choices: tuple[AnswerChoice, ...] = ()
-    renders: tuple[RenderInfo, ...] = ()
-    console: ConsoleInfo | None = None
-    planes: PlanesInfo | None = None
+    renders: tuple[message_parts.RenderInfo, ...] = ()
+    console: message_parts.ConsoleInfo | None = None
+    planes: message_parts.PlanesInfo | None = None
     reading: PlanesReading | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
+class AnswerUpdate(message_parts.EditState, Findings, Event, kind="answer", is_observed=True):
     """The current lights: the answer to paint and requests, unasked once the exact answer is found,
     and again with its analysis.
 
@@ -140,7 +118,7 @@ class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CanvasPatch(EditState, Event, kind="patch"):
+class CanvasPatch(message_parts.EditState, Event, kind="patch"):
     """New pixels of a canvas, after undo and the like: one message for each changed view; `views`
     lists all of these.
 
@@ -163,7 +141,9 @@ class CanvasPatch(EditState, Event, kind="patch"):
     @property
     def answer(self) -> AnswerUpdate:
         """Return the same as an answer, without pixels."""
-        standing = {name: getattr(self, name) for name in EditState.__dataclass_fields__}
+        standing = {
+            name: getattr(self, name) for name in message_parts.EditState.__dataclass_fields__
+        }
         return AnswerUpdate(
             version=self.version,
             stroke=self.stroke,
@@ -175,7 +155,7 @@ class CanvasPatch(EditState, Event, kind="patch"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SelectionUpdate(EditState, Event, kind="selected"):
+class SelectionUpdate(message_parts.EditState, Event, kind="selected"):
     """The new selection: the answer to `select`, which changes no light."""
 
 
@@ -241,10 +221,10 @@ class StepList(Event, kind="steps"):
     beginning. searches: those after a step that still exists, the oldest first.
     """
 
-    steps: tuple[StepInfo, ...]
+    steps: tuple[message_parts.StepInfo, ...]
     earlier: int
     done: int
-    searches: tuple[SearchInfo, ...] = ()
+    searches: tuple[message_parts.SearchInfo, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,7 +245,7 @@ class LookList(Event, kind="looks", is_observed=True):
     resources: as in `renewed`.
     """
 
-    looks: tuple[LookInfo, ...]
+    looks: tuple[message_parts.LookInfo, ...]
     resources: Mapping[str, int]
 
 
@@ -275,7 +255,7 @@ class ReferenceList(Event, kind="references"):
     has become one.
     """
 
-    references: tuple[ReferenceInfo, ...]
+    references: tuple[message_parts.ReferenceInfo, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -301,21 +281,21 @@ class Rig(Event, kind="rig"):
     objects: those within that box, the largest first. skies: of images that are skies.
     """
 
-    lights: tuple[LightPlace, ...]
-    cameras: tuple[Camera | None, ...]
+    lights: tuple[message_parts.LightPlace, ...]
+    cameras: tuple[message_parts.Camera | None, ...]
     up: int
-    low: Place
-    high: Place
+    low: message_parts.Place
+    high: message_parts.Place
     surfaces: tuple[str, ...]
-    objects: tuple[PlanObject, ...]
-    skies: tuple[SkyAxes, ...]
+    objects: tuple[message_parts.PlanObject, ...]
+    skies: tuple[message_parts.SkyAxes, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConsoleState(Event, kind="console"):
     """The state of the console: the answer to requests about it."""
 
-    console: ConsoleInfo | None
+    console: message_parts.ConsoleInfo | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -326,7 +306,7 @@ class Notice(Event, kind="notice", is_observed=True):
     """
 
     text: str
-    tone: Tone = "info"
+    tone: message_parts.Tone = "info"
     task: str | None = field(default=None, metadata=OPTIONAL)
 
 
@@ -338,7 +318,7 @@ class Failure(Event, kind="failed"):
     """
 
     text: str
-    tone: Tone | None = field(default=None, metadata=OPTIONAL)
+    tone: message_parts.Tone | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

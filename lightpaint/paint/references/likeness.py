@@ -15,22 +15,10 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import adjusted
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.presets.lighting_presets import (
-    PRESETS,
-    open_group,
-    open_preset,
-    reduced_areas,
-    selected_mask,
-)
+from lightpaint.paint.presets import lighting_presets
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.protocol import ApplyPreset, LookLike
-from lightpaint.paint.references.reference_light import (
-    FINDING_SIDE,
-    LightLayers,
-    distance_of,
-    find_light,
-    is_soft,
-)
+from lightpaint.paint.references import reference_light
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.references.tones import DETAIL_SIZE, Tones, Weights, edges
 from lightpaint.paint.store.history_steps import Region
@@ -360,8 +348,8 @@ def open_request(
     Returns what changes, and the name of the step. Raises PaintError if it cannot be met.
     """
     if isinstance(request, ApplyPreset):
-        changes = open_preset(canvases, request.preset, request.subject)
-        return changes, PRESETS[request.preset].title
+        changes = lighting_presets.open_preset(canvases, request.preset, request.subject)
+        return changes, lighting_presets.PRESETS[request.preset].title
     reference = references[request.reference]
     name = f"Like {reference.name}"[:MAX_NAME_LENGTH]
     return _open_likeness(canvases, request, Tones(references.light(reference)), name)
@@ -379,12 +367,14 @@ def _open_likeness(
     if request.areas != "pairs":
         view, part = _view_shown(canvases, request.view, reference)
     canvas = canvases[view]
-    light, areas = reduced_areas(canvas, canvas.image, FINDING_SIDE)
+    light, areas = lighting_presets.reduced_areas(
+        canvas, canvas.image, reference_light.FINDING_SIDE
+    )
     layers: list[Layer] = []
     makers: list[Callable[[Canvas, ViewAreas], Mask]] = []
     asked = light
     if request.areas in ("whole", "regions") and part is None:
-        found = find_light(
+        found = reference_light.find_light(
             canvas, reference, light, areas, matches_brightness=request.matches_brightness
         )
         if found is not None:
@@ -404,7 +394,9 @@ def _open_likeness(
     numbered = [replace(x, id=first + k, group=group) for k, x in enumerate(layers)]
     views = [view] if request.areas == "pairs" else range(len(canvases))
     masks = {k: _masks(canvases[k], makers) for k in views}
-    return open_group(canvases, [*numbered, Layer(group, "group", name)], masks), name
+    return lighting_presets.open_group(
+        canvases, [*numbered, Layer(group, "group", name)], masks
+    ), name
 
 
 def _changes(
@@ -435,7 +427,7 @@ def _changes(
         return changes
     tones, known = reference.light_tones, areas.whole > 0
     pictures = light, changed_light(light, changes, areas)
-    before, after = (distance_of(canvas, tones, x, known) for x in pictures)
+    before, after = (reference_light.distance_of(canvas, tones, x, known) for x in pictures)
     return changes if after <= before else []
 
 
@@ -448,14 +440,18 @@ def _view_shown(canvases: Canvases, first: int, reference: Tones) -> tuple[int, 
     best: tuple[int, ViewPart | None] = first, None
     highest = SAME_PLACE
     for k in sorted(range(len(canvases)), key=lambda k: k != first):
-        light, _ = reduced_areas(canvases[k], canvases[k].image, FINDING_SIDE)
+        light, _ = lighting_presets.reduced_areas(
+            canvases[k], canvases[k].image, reference_light.FINDING_SIDE
+        )
         part = find_part(reference, light)
         if part.likeness >= highest:
             best, highest = (k, part), part.likeness
     return best
 
 
-def _light_mask(found: LightLayers, number: int, canvas: Canvas, areas: ViewAreas) -> Mask:
+def _light_mask(
+    found: reference_light.LightLayers, number: int, canvas: Canvas, areas: ViewAreas
+) -> Mask:
     return found.mask(canvas, areas, number)
 
 
@@ -467,7 +463,7 @@ def _masks(canvas: Canvas, makers: Sequence[Callable[[Canvas, ViewAreas], Mask]]
     """Return masks in a view, within what is selected."""
     basis = canvas.basis
     found = ViewAreas(canvas.image, basis.emitters_seen, basis.features, basis.objects)
-    selected = selected_mask(canvas)
+    selected = lighting_presets.selected_mask(canvas)
     return [maker(canvas, found) * selected for maker in makers]
 
 
@@ -483,7 +479,7 @@ def compared_areas(
         has_regions = request.areas == "regions"
         if part is not None:
             return (WHOLE_AREA, *TONE_AREAS, *(part_areas(part) if has_regions else ()))
-        tones = TONE_AREAS if is_soft(reference.light_tones) else ()
+        tones = TONE_AREAS if reference_light.is_soft(reference.light_tones) else ()
         bands = BAND_AREAS if has_regions else ()
         return (
             *of_another_place(tones, TONE_STOPS),

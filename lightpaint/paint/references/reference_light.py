@@ -15,14 +15,8 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
+from lightpaint.paint.presets import lighting_presets
 from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
-from lightpaint.paint.presets.lighting_presets import (
-    LampGroup,
-    is_divided,
-    layers_of,
-    masks_of,
-    reduction,
-)
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
 from lightpaint.paint.references.tones import LightTones, Tones
 from lightpaint.paint.store.history_steps import Pixels
@@ -273,8 +267,8 @@ class LightLayers:
     that is asked for: less than 1 where all of them would lead away from the reference.
     """
 
-    groups: tuple[LampGroup, ...]
-    fill: LampGroup
+    groups: tuple[lighting_presets.LampGroup, ...]
+    fill: lighting_presets.LampGroup
     layers: tuple[Layer, ...]
     image: Floats
     strength: float
@@ -284,7 +278,7 @@ class LightLayers:
         if number == 0:
             return areas.whole
         shares = [_share(canvas.basis, group.lamps, areas) for group in self.groups]
-        masks = masks_of(self.groups, self.fill, shares)
+        masks = lighting_presets.masks_of(self.groups, self.fill, shares)
         return np.asarray(masks[number - 1] * areas.whole, np.float32)
 
 
@@ -352,7 +346,7 @@ def without_surfaces(canvas: Canvas, light: Floats) -> Floats:
     features = canvas.basis.features
     if features is None:
         return light
-    albedo = features.reduced(reduction(canvas, FINDING_SIDE)).albedo
+    albedo = features.reduced(lighting_presets.reduction(canvas, FINDING_SIDE)).albedo
     return np.asarray(light / np.maximum(albedo, MIN_ALBEDO), np.float32)
 
 
@@ -363,7 +357,9 @@ def _lamp_light(
     weights = canvas.basis.current_weights * roles.lights(lamps)[:, None]
     if not weights.any():
         return LampLight(0.0, np.zeros(3))
-    image = denoise_mix(canvas.basis, weights, factor=reduction(canvas, FINDING_SIDE))
+    image = denoise_mix(
+        canvas.basis, weights, factor=lighting_presets.reduction(canvas, FINDING_SIDE)
+    )
     tones = Tones(without_surfaces(canvas, np.maximum(image, 0)), known).light_tones
     return LampLight(roles.level(lamps), tones.lit if is_key else tones.shadows)
 
@@ -392,7 +388,7 @@ def _layers(
     """
     names = ("Key light",) if len(keys) == 1 else ("Key light, left", "Key light, right")
     groups = [
-        LampGroup(name, key, 2.0**match.key_stops * gain, tint)
+        lighting_presets.LampGroup(name, key, 2.0**match.key_stops * gain, tint)
         for name, key, tint, gain in zip(
             names, keys, match.key_tints, _balance(roles, keys), strict=True
         )
@@ -402,23 +398,27 @@ def _layers(
     if is_sky and sky.any() and roles.lights(sky).any():
         stops = match.fill_stops + BACKDROP * (match.key_stops - match.fill_stops)
         tint = match.fill_tint + BACKDROP * (match.key_tints[0] - match.fill_tint)
-        groups.append(LampGroup("Backdrop", sky, 2.0**stops, tint))
+        groups.append(lighting_presets.LampGroup("Backdrop", sky, 2.0**stops, tint))
     rest = ~np.any([x.lamps for x in groups], axis=0)
-    fill = LampGroup("Fill light", rest, 2.0**match.fill_stops, match.fill_tint)
+    fill = lighting_presets.LampGroup("Fill light", rest, 2.0**match.fill_stops, match.fill_tint)
     picture = Tones(light, areas.whole > 0).light_tones
     if level is None and has_pool(reference):
         level = 0.0
     elif level is None:
         level = _steady_stops(roles, (*groups, fill)) - stops_darker(reference, picture)
     fill, *groups = (
-        LampGroup(x.name, roles.lights(x.lamps), x.gain * 2.0**level, gains_of(x.tint))
+        lighting_presets.LampGroup(
+            x.name, roles.lights(x.lamps), x.gain * 2.0**level, gains_of(x.tint)
+        )
         for x in (fill, *groups)
     )
-    layers = layers_of(groups, fill, 1, "")[:-1]
-    factor = reduction(canvas, FINDING_SIDE)
+    layers = lighting_presets.layers_of(groups, fill, 1, "")[:-1]
+    factor = lighting_presets.reduction(canvas, FINDING_SIDE)
     shares = [_share(canvas.basis, x.lamps, areas, factor) for x in groups]
     pixels = Pixels.unpainted(np.asarray(light, np.float32))
-    for layer, mask in zip(layers, [areas.whole, *masks_of(groups, fill, shares)], strict=True):
+    for layer, mask in zip(
+        layers, [areas.whole, *lighting_presets.masks_of(groups, fill, shares)], strict=True
+    ):
         pixels = compose_layer(layer, Pixels(np.zeros_like(light), mask), pixels)
     return LightLayers(tuple(groups), fill, layers, pixels.image, 1.0)
 
@@ -437,7 +437,7 @@ def _balance(roles: LampRoles, keys: Sequence[Bools]) -> list[float]:
     return [float(np.clip(mean / x, 1 / MOST_BALANCE, MOST_BALANCE)) for x in amounts]
 
 
-def _steady_stops(roles: LampRoles, groups: Sequence[LampGroup]) -> float:
+def _steady_stops(roles: LampRoles, groups: Sequence[lighting_presets.LampGroup]) -> float:
     """Return the stops that leave the highlights of a picture as bright as they are, but do not
     make all of it much brighter.
     """
@@ -459,4 +459,8 @@ def _log2(value: float) -> float:
 
 def _share(basis: Basis, lamps: Bools, areas: ViewAreas, factor: int = 1) -> Mask:
     """Return the share (h, w) of the light that comes from lamps; lit parts for all or none."""
-    return light_share(basis, lamps, factor) if is_divided(basis, lamps) else areas.lit
+    return (
+        light_share(basis, lamps, factor)
+        if lighting_presets.is_divided(basis, lamps)
+        else areas.lit
+    )

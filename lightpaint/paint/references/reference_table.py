@@ -16,15 +16,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, choose_exposure, read_icc
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.files import first_line, one_line
-from lightpaint.images import naming_file, read_picture, resampled
-from lightpaint.images.formats import (
-    MAX_PIXELS,
-    Bitmap,
-    head_of,
-    light_of_integers,
-    silenced,
-    without_pillow_warnings,
-)
+from lightpaint.images import formats, naming_file, read_picture, resampled
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
 from lightpaint.paint.store.session_file import Store
@@ -48,11 +40,11 @@ def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
 
     transform: by which the session shows light. Raises ImageError, in one line that names the file.
     """
-    head = head_of(path, 16)
+    head = formats.head_of(path, 16)
     is_light = False
     if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
         with naming_file(path):
-            light = light_of_integers(_webp(path), None, transform)
+            light = formats.light_of_integers(_webp(path), None, transform)
     elif head.startswith(b"#?"):
         with naming_file(path):
             light, is_light = _radiance(path), True
@@ -86,12 +78,12 @@ def _light_of_painting(path: Path, transform: ViewTransform) -> tuple[Floats, bo
     return light, picture.codes is None
 
 
-def _webp(path: Path) -> Bitmap:
+def _webp(path: Path) -> formats.Bitmap:
     """Return the picture in a WebP file over black. Raises ImageError, without naming the file."""
     from PIL import Image, ImageOps
 
     try:
-        with without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
+        with formats.without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
             _check_size(file.size)
             profile = file.info.get("icc_profile")
             upright = ImageOps.exif_transpose(file).convert("RGBA")
@@ -101,14 +93,14 @@ def _webp(path: Path) -> Bitmap:
     alpha = values[..., 3:].astype(np.float32) / 255
     display = np.round(values[..., :3] * alpha).astype(np.uint8)
     icc = None if profile is None else read_icc(profile)
-    return Bitmap("webp", display, None, False, 255, icc, lossy=True)
+    return formats.Bitmap("webp", display, None, False, 255, icc, lossy=True)
 
 
 def _radiance(path: Path) -> Floats:
     """Return the light in a Radiance HDR file, (h, w, 3). Raises ImageError, without naming it."""
     import OpenImageIO
 
-    with silenced():
+    with formats.silenced():
         OpenImageIO.geterror()
         file = OpenImageIO.ImageInput.open(str(path))
         if file is None:
@@ -127,9 +119,10 @@ def _radiance(path: Path) -> Floats:
 
 def _check_size(size: tuple[int, int]) -> None:
     width, height = size
-    if min(size) < 1 or width * height > MAX_PIXELS:
+    if min(size) < 1 or width * height > formats.MAX_PIXELS:
         raise ImageError(
-            f"declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} million"
+            f"declares {width}x{height} pixels: expected at most "
+            f"{formats.MAX_PIXELS / 1e6:.0f} million"
         )
 
 

@@ -28,15 +28,8 @@ from lightpaint.basis import (
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.images import Features
 from lightpaint.paint.protocol import Camera, LightPlace, Place, PlanObject, Rig, SkyAxes
+from lightpaint.paint.rig import page_geometry
 from lightpaint.paint.rig.added_lights import POSE_KEYS, light_of_new, new_emitter, site_of_new
-from lightpaint.paint.rig.page_geometry import (
-    camera_of,
-    free_length,
-    in_this_thread,
-    plan_objects,
-    sky_axes,
-    up_axis,
-)
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
@@ -66,7 +59,7 @@ class RigView:
     @cached_property
     def quick(self) -> QuickPlanes:
         """The quick planes, whose paths are traced on first use; that takes longer than to load."""
-        with in_this_thread():
+        with page_geometry.in_this_thread():
             return QuickPlanes(self.scene, self.loaded, self.features)
 
     @cached_property
@@ -135,8 +128,8 @@ class LampRig:
     def cameras(self) -> tuple[Camera | None, ...]:
         """The camera of each view; None for one that is not a pinhole. The rig is open."""
         assert self.views is not None
-        with in_this_thread():
-            return tuple(camera_of(view.scene, view.loaded) for view in self.views)
+        with page_geometry.in_this_thread():
+            return tuple(page_geometry.camera_of(view.scene, view.loaded) for view in self.views)
 
     @cached_property
     def bounds(self) -> tuple[Doubles, Doubles] | None:
@@ -157,14 +150,16 @@ class LampRig:
         assert self.views is not None
         low, high = self.bounds or (np.zeros(3), np.ones(3))
         view = self.views[0]
-        with in_this_thread():
-            return plan_objects(view.scene, view.loaded, up_axis(self.cameras), low, high)
+        with page_geometry.in_this_thread():
+            return page_geometry.plan_objects(
+                view.scene, view.loaded, page_geometry.up_axis(self.cameras), low, high
+            )
 
     @cached_property
     def skies(self) -> tuple[SkyAxes, ...]:
         """Axes of the skies among its images. The rig is open."""
-        with in_this_thread():
-            return sky_axes(self.scene)
+        with page_geometry.in_this_thread():
+            return page_geometry.sky_axes(self.scene)
 
     @property
     def extent(self) -> float:
@@ -184,7 +179,7 @@ class LampRig:
                 # With a kept basis no scene has been read yet, and Mitsuba has no variant.
                 for subject in self.subjects:
                     subject.loaded_scene  # noqa: B018 (it is cached)
-                with in_this_thread():
+                with page_geometry.in_this_thread():
                     self.views = tuple(map(open_view, self.subjects, bases))
 
     def trace_paths(self) -> None:
@@ -313,7 +308,7 @@ class LampRig:
                 light = light_of_new(new_emitter(name, values))
             else:
                 light = replace(basis.lights[basis.names.index(name)], identity="")
-            with in_this_thread():
+            with page_geometry.in_this_thread():
                 plane = quick.plane(site, self.step)
             light_bases.append(one_light_basis(basis, light, plane))
         return light_bases
@@ -381,7 +376,7 @@ class LampRig:
         return Rig(
             lights=places,
             cameras=cameras,
-            up=up_axis(cameras),
+            up=page_geometry.up_axis(cameras),
             low=tuple(map(float, low)),
             high=tuple(map(float, high)),
             surfaces=self.surfaces,
@@ -395,7 +390,7 @@ class LampRig:
         if key not in self._known_places:
             if len(self._known_places) >= MAX_KNOWN:
                 self._known_places.clear()
-            with in_this_thread():
+            with page_geometry.in_this_thread():
                 self._known_places[key] = self._place(name, values)
         return self._known_places[key]
 
@@ -430,7 +425,7 @@ class LampRig:
         if site.position is None or site.direction is None:
             return None
         place, way = np.array(site.position), np.array(site.direction)
-        length = free_length(self.view(0).loaded, place + 1e-3 * way, way)
+        length = page_geometry.free_length(self.view(0).loaded, place + 1e-3 * way, way)
         low, high = self.bounds or (np.zeros(3), np.ones(3))
         return np.asarray(place + min(length, float(np.linalg.norm(high - low))) * way)
 

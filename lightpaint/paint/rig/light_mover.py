@@ -15,18 +15,9 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, DenoisedPlanes, as_halves, denoise_to_halves
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import LightpaintError, PaintError, SceneError
+from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.protocol import (
-    AddLight,
-    DraggedPlane,
-    Message,
-    MoveLights,
-    Notice,
-    PictureUpdate,
-    PointLight,
-    TaskStarted,
-)
 from lightpaint.paint.rig.added_lights import free_name, hung_at, hung_before, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig, RigView
 from lightpaint.paint.rig.page_geometry import (
@@ -38,16 +29,9 @@ from lightpaint.paint.rig.page_geometry import (
     in_this_thread,
     up_axis,
 )
+from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.painting_session import Session
-from lightpaint.paint.session.picture_table import (
-    Picture,
-    page_emitters,
-    page_factor,
-    page_plane,
-    plane_scale,
-    plane_thumbnail,
-)
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.scene import NewEmitter, Pose
@@ -99,11 +83,11 @@ class LightMover:
         self._is_open = False
         self._work.stop()
 
-    def show_rig(self) -> list[Message]:
+    def show_rig(self) -> list[protocol.Message]:
         """Load the rig in the background, and publish it now and after every move."""
         self._shows_rig = True
         self._threads.start_low_priority(self._open_rig, "rig")
-        return [TaskStarted(task="rig")]
+        return [protocol.TaskStarted(task="rig")]
 
     def _open_rig(self) -> None:
         self.rig.open(self._access.session.bases)
@@ -114,13 +98,13 @@ class LightMover:
         for message in self.rig_messages():
             self._publisher.publish(message)
 
-    def rig_messages(self) -> list[Message]:
+    def rig_messages(self) -> list[protocol.Message]:
         """Return the places of lights, if pages have requested them."""
         if not (self._shows_rig and self.rig.is_open):
             return []
         return [self.rig.state(self._access.session.requests.placed)]
 
-    def move_of(self, request: PointLight) -> MoveLights:
+    def move_of(self, request: protocol.PointLight) -> protocol.MoveLights:
         """Return the move that a pointing request implies. Raises LightpaintError."""
         session = self._access.session
         self.rig.open(session.bases)
@@ -129,9 +113,9 @@ class LightMover:
             raise PaintError(f"no light {request.light}: there are {len(names)}")
         name = names[request.light]
         pose = pose_change(self.rig, request, name, session.requests.placed.get(name, {}))
-        return MoveLights({name: pose}, request.is_final, request.view, request.step)
+        return protocol.MoveLights({name: pose}, request.is_final, request.view, request.step)
 
-    def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
+    def hang(self, request: protocol.AddLight) -> tuple[str, dict[str, Any]]:
         """Return name and values of the light that a request adds. Raises PaintError."""
         session = self._access.session
         self.rig.open(session.bases)
@@ -153,7 +137,7 @@ class LightMover:
         planes = self.rig.quick_planes(self._access.session.bases, name, values)
         return mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
 
-    def follow(self, send: Callable[[Message], None], view: int = 0) -> bool:
+    def follow(self, send: Callable[[protocol.Message], None], view: int = 0) -> bool:
         """Show the planes of newly moved lights, and render them once they rest.
 
         send: receives the messages about them. view: the one in which a page shows a light that is
@@ -209,7 +193,7 @@ class LightMover:
         except StoppedError:
             pass
         except LightpaintError as error:  # the next move is rendered again
-            self._publisher.publish(Notice(text=str(error), tone="warn"))
+            self._publisher.publish(protocol.Notice(text=str(error), tone="warn"))
 
     def finish(self, placed: Placed, check: Callable[[], None]) -> None:
         """Replace the quick planes of these lights by rendered ones. check: raises to stop."""
@@ -219,7 +203,7 @@ class LightMover:
             self._publisher.publish_made(partial(self._renew, name, placed[name]))
             self._on_rendered()
 
-    def _renew(self, name: str, values: Mapping[str, Any]) -> PictureUpdate | None:
+    def _renew(self, name: str, values: Mapping[str, Any]) -> protocol.PictureUpdate | None:
         """Give the session the rendered planes of a light, unless it has moved on."""
         session = self._access.session
         if session.requests.placed.get(name) != values:
@@ -235,35 +219,39 @@ class LightMover:
         self._shown = dict(session.requests.placed)
         self._offer(session, list(session.requests.placed), is_dragged=False)
 
-    def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
+    def _offer(
+        self, session: Session, names: Sequence[str], *, is_dragged: bool
+    ) -> protocol.PictureUpdate:
         """Offer the current pictures of lights, and return the messages that announce them."""
         pictures, offered = self._publisher.pictures, []
         clean = None if is_dragged else self._clean_planes(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):
             for name in names:
                 k = view.basis.names.index(name)
-                scale = plane_scale(unmoved, k)
+                scale = picture_table.plane_scale(unmoved, k)
                 is_moved = name in session.requests.placed
-                plane = page_plane(view.basis.planes.plane(k), unmoved)
-                make: Callable[[], Picture] = partial(as_halves, plane, scale)
+                plane = picture_table.page_plane(view.basis.planes.plane(k), unmoved)
+                make: Callable[[], picture_table.Picture] = partial(as_halves, plane, scale)
                 clean_planes = clean[view.view] if clean is not None else None
                 if not is_moved and clean_planes is not None:
                     make = partial(_kept_halves, clean_planes, k)
-                makers: dict[str, Callable[[], Picture]] = {
+                makers: dict[str, Callable[[], picture_table.Picture]] = {
                     f"clean/{k}": make,
                     f"plane/{k}": partial(as_halves, plane, scale),
                 }
                 if not is_dragged:
                     shown = plane if is_moved or clean_planes is None else clean_planes.plane(k)
-                    makers[f"thumb/{k}"] = partial(plane_thumbnail, shown, page_emitters(unmoved))
+                    makers[f"thumb/{k}"] = partial(
+                        picture_table.plane_thumbnail, shown, picture_table.page_emitters(unmoved)
+                    )
                 for plain, maker in makers.items():
                     full = name_in_view(plain, view.view)
                     pictures.offer(full, maker)
                     offered.append(full)
         resources = {name: pictures.generations[name] for name in offered}
-        return PictureUpdate(resources=resources)
+        return protocol.PictureUpdate(resources=resources)
 
-    def _dragged_planes(self, session: Session, number: int) -> list[DraggedPlane]:
+    def _dragged_planes(self, session: Session, number: int) -> list[protocol.DraggedPlane]:
         """Return the pictures of dragged lights in a view."""
         pictures, basis = self._publisher.pictures, session.views[number].basis
         messages, step = [], self.rig.step
@@ -274,11 +262,13 @@ class LightMover:
                 pictures.keep(names[1], picture)
             else:  # the whole picture is made only if it is fetched
                 unmoved = session.bases[number]
-                plane = page_plane(basis.planes.plane(k), unmoved)[::step, ::step]
-                picture = as_halves(plane, plane_scale(unmoved, k))
+                plane = picture_table.page_plane(basis.planes.plane(k), unmoved)[::step, ::step]
+                picture = as_halves(plane, picture_table.plane_scale(unmoved, k))
             resources = {name: pictures.generations[name] for name in names}
             messages.append(
-                DraggedPlane(light=k, view=number, step=step, resources=resources, data=picture)
+                protocol.DraggedPlane(
+                    light=k, view=number, step=step, resources=resources, data=picture
+                )
             )
         return messages
 
@@ -291,16 +281,23 @@ class LightMover:
             if name not in basis.names:
                 return
             k = basis.names.index(name)
-            scale = plane_scale(unmoved, k)
-            halves, own = denoise_to_halves(basis, k, page_factor(unmoved))
+            scale = picture_table.plane_scale(unmoved, k)
+            halves, own = denoise_to_halves(basis, k, picture_table.page_factor(unmoved))
             picture = as_halves(halves.astype("float32") * own, scale)
-            thumbnail = plane_thumbnail(picture.astype("float32"), page_emitters(unmoved))
+            thumbnail = picture_table.plane_thumbnail(
+                picture.astype("float32"), picture_table.page_emitters(unmoved)
+            )
             put = partial(self._put_denoised, view, basis, k, picture, thumbnail)
             self._publisher.publish_made(put)
 
     def _put_denoised(
-        self, view: Canvas, basis: Basis, k: int, picture: Picture, thumbnail: Picture
-    ) -> PictureUpdate | None:
+        self,
+        view: Canvas,
+        basis: Basis,
+        k: int,
+        picture: picture_table.Picture,
+        thumbnail: picture_table.Picture,
+    ) -> protocol.PictureUpdate | None:
         """Put the denoised picture of a plane of `basis`, unless the view has other planes now."""
         if view.basis.planes is not basis.planes:
             return None
@@ -309,14 +306,14 @@ class LightMover:
             full = name_in_view(name, view.view)
             table.put(full, new_picture)
             resources[full] = table.generations[full]
-        return PictureUpdate(resources=resources)
+        return protocol.PictureUpdate(resources=resources)
 
 
-def _unlit_warnings(session: Session, names: Collection[str]) -> list[Notice]:
+def _unlit_warnings(session: Session, names: Collection[str]) -> list[protocol.Notice]:
     """Return warnings of lights that light nothing visible, such as those inside a wall."""
     numbers = {name: session.basis.names.index(name) for name in sorted(names)}
     return [
-        Notice(
+        protocol.Notice(
             text=f"{name} lights nothing that is seen from there: it may be in a wall, or far away",
             tone="warn",
         )
@@ -325,7 +322,7 @@ def _unlit_warnings(session: Session, names: Collection[str]) -> list[Notice]:
     ]
 
 
-def _kept_halves(planes: DenoisedPlanes, k: int) -> Picture:
+def _kept_halves(planes: DenoisedPlanes, k: int) -> picture_table.Picture:
     return np.asarray(planes.halves[k])
 
 
@@ -401,7 +398,7 @@ def _listed(point: Doubles) -> list[float]:
 
 
 def pose_change(
-    rig: LampRig, request: PointLight, name: str, values: Mapping[str, Any]
+    rig: LampRig, request: protocol.PointLight, name: str, values: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the change of a light's pose that a pointing request implies. The rig is open.
 
@@ -420,7 +417,7 @@ def pose_change(
         return _with_shadow(name, site, _visible_surface(view, request.edge), hit, length)
 
 
-def emitter_at_place(rig: LampRig, request: AddLight, name: str) -> NewEmitter:
+def emitter_at_place(rig: LampRig, request: protocol.AddLight, name: str) -> NewEmitter:
     """Return a new light at the place that a request marks. The rig is open.
 
     Its emission is set later. Raises PaintError if no light can hang there.
@@ -437,7 +434,9 @@ def emitter_at_place(rig: LampRig, request: AddLight, name: str) -> NewEmitter:
         return hung_before(name, request.type, hit, rig.extent, length)
 
 
-def _emitter_at_position(view: RigView, request: AddLight, name: str, extent: float) -> NewEmitter:
+def _emitter_at_position(
+    view: RigView, request: protocol.AddLight, name: str, extent: float
+) -> NewEmitter:
     """Return a new light at a point of space, such as a point of the plan; it points down."""
     down = np.zeros(3)
     down[up_axis([camera_of(view.scene, view.loaded)])] = -1.0

@@ -8,17 +8,8 @@ from typing import Any
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting import Solution
+from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import StoppedError
-from lightpaint.paint.protocol import (
-    EstimatePlaces,
-    Message,
-    PlaceLights,
-    PlacingEstimate,
-    PlacingResult,
-    SearchInfo,
-    TaskStarted,
-    TrialPlaces,
-)
 from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_looks import of_moved_scenes
@@ -71,22 +62,26 @@ class SearchNotes:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self._records = StoredRecords(store, "searches", SearchInfo)
+        self._records = StoredRecords(store, "searches", protocol.SearchInfo)
         self._notes = self._records.read()
 
-    def add(self, title: str, text: str, tried: Sequence[str], seconds: float) -> SearchInfo:
+    def add(
+        self, title: str, text: str, tried: Sequence[str], seconds: float
+    ) -> protocol.SearchInfo:
         """Keep a note on a search that has just ended, after the step that is the last one now.
 
         title: what was searched for. text: the result. tried: sentences on what was tried.
         """
         number = max((note.id for note in self._notes), default=0) + 1
         stamp, after = time.time(), self._store.last_id
-        note = SearchInfo(number, after, title, text, tuple(tried), stamp, round(seconds, 1))
+        note = protocol.SearchInfo(
+            number, after, title, text, tuple(tried), stamp, round(seconds, 1)
+        )
         self._notes = [*self._notes, note][-MAX_NOTES:]
         self._records.write(self._notes)
         return note
 
-    def listed(self) -> tuple[SearchInfo, ...]:
+    def listed(self) -> tuple[protocol.SearchInfo, ...]:
         """Return the notes whose step still exists, the oldest first."""
         ids = {0, *self._store.step_ids}
         return tuple(note for note in self._notes if note.after in ids)
@@ -111,8 +106,8 @@ class LightPlacer:
     ) -> None:
         self._access, self._publisher, self._threads = links
         self._rig, self._hang_lights = rig, hang_lights
-        self._request: PlaceLights | None = None
-        self._ended_request: PlaceLights | None = None  # it ends with the best so far
+        self._request: protocol.PlaceLights | None = None
+        self._ended_request: protocol.PlaceLights | None = None  # it ends with the best so far
         self._pace: float | None = None  # of the last search that was not ended early
         self._notes: SearchNotes | None = None
 
@@ -123,7 +118,7 @@ class LightPlacer:
             self._notes = SearchNotes(self._access.session.store)
         return self._notes
 
-    def handle(self, request: PlaceLights) -> list[Message]:
+    def handle(self, request: protocol.PlaceLights) -> list[protocol.Message]:
         """Start the search, or stop it. Raises LightpaintError if there is nothing to search for.
 
         A new search replaces a running one.
@@ -133,24 +128,24 @@ class LightPlacer:
                 self._ended_request = self._request
             else:
                 self._request = None
-            return [TaskStarted(task="stop")]
+            return [protocol.TaskStarted(task="stop")]
         self._checked_snapshot(request)
         # Created here, in the thread of requests, since a search ends in its own.
         _ = self.notes
         self._request = request
         self._threads.start_low_priority(lambda: self._run(request), "place")
-        return [TaskStarted(task="place")]
+        return [protocol.TaskStarted(task="place")]
 
-    def estimate(self, request: EstimatePlaces) -> list[Message]:
+    def estimate(self, request: protocol.EstimatePlaces) -> list[protocol.Message]:
         """Return what a search would do and how long it takes. Raises as `handle` does."""
-        search = PlaceLights(True, request.new_type, request.max_count, request.surfaces)
+        search = protocol.PlaceLights(True, request.new_type, request.max_count, request.surfaces)
         snapshot = self._checked_snapshot(search)
         low, high = self._size(search, snapshot).seconds(self._pace or usual_pace())
         text = " ".join(self._attempts(search, snapshot))
         is_measured = self._pace is not None
-        return [PlacingEstimate(text=text, seconds=(low, high), is_measured=is_measured)]
+        return [protocol.PlacingEstimate(text=text, seconds=(low, high), is_measured=is_measured)]
 
-    def _checked_snapshot(self, request: PlaceLights) -> SessionSnapshot:
+    def _checked_snapshot(self, request: protocol.PlaceLights) -> SessionSnapshot:
         """Return the snapshot. Raises LightpaintError if there is nothing to search for."""
         snapshot = self._access.snapshot()
         if not snapshot.painted_views:
@@ -167,14 +162,14 @@ class LightPlacer:
             raise PaintError("no light is free to move: unlock a point, a spot or a sun")
         return snapshot
 
-    def _size(self, request: PlaceLights, snapshot: SessionSnapshot) -> SearchSize:
+    def _size(self, request: protocol.PlaceLights, snapshot: SessionSnapshot) -> SearchSize:
         """Return what a search has to do."""
         is_move = request.new_type is None
         lights, new = (len(self._freedoms(snapshot)), 0) if is_move else (0, request.max_count)
         sizes = [snapshot.bases[k].size for k in snapshot.painted_views]
         return SearchSize.of(lights, new, sum(height * width for height, width in sizes))
 
-    def _attempts(self, request: PlaceLights, snapshot: SessionSnapshot) -> list[str]:
+    def _attempts(self, request: protocol.PlaceLights, snapshot: SessionSnapshot) -> list[str]:
         """Return sentences on what a search tries: which lights, and what they may do."""
         if request.new_type is not None:
             count, surfaces = request.max_count, request.surfaces
@@ -205,7 +200,7 @@ class LightPlacer:
             )
         return freedoms
 
-    def _new_lights(self, request: PlaceLights, snapshot: SessionSnapshot) -> NewLights:
+    def _new_lights(self, request: protocol.PlaceLights, snapshot: SessionSnapshot) -> NewLights:
         """Return the lights that a request may add. Raises LightpaintError for impossible ones."""
         assert request.new_type is not None
         scene, kind = self._rig.scene, request.new_type
@@ -220,7 +215,7 @@ class LightPlacer:
         name = free_name(kind, taken) if request.max_count == 1 else kind
         return NewLights(kind, count=request.max_count, freedom=freedom, name=name)
 
-    def _run(self, request: PlaceLights) -> None:
+    def _run(self, request: protocol.PlaceLights) -> None:
         """Search, publish the result and note it."""
         snapshot, began_s = self._access.snapshot(), time.monotonic()
         attempts, size = self._attempts(request, snapshot), self._size(request, snapshot)
@@ -232,10 +227,10 @@ class LightPlacer:
         is_move = request.new_type is None
         title = "let lights move" if is_move else f"find places for a new {request.new_type}"
         self.notes.add(title, text, attempts, seconds)
-        self._publisher.publish(PlacingResult(text=text, names=names))
+        self._publisher.publish(protocol.PlacingResult(text=text, names=names))
 
     def _result(
-        self, request: PlaceLights, snapshot: SessionSnapshot
+        self, request: protocol.PlaceLights, snapshot: SessionSnapshot
     ) -> tuple[str, tuple[str, ...]]:
         """Search and hang the lights; return what came of it, and the names of these lights."""
 
@@ -300,7 +295,7 @@ class LightPlacer:
         return snapshot.delta_e(solution), state.delta_e(placed_solution)
 
     def _searched(
-        self, request: PlaceLights, snapshot: SessionSnapshot, check: Callable[[], None]
+        self, request: protocol.PlaceLights, snapshot: SessionSnapshot, check: Callable[[], None]
     ) -> tuple[Solution, Placement]:
         """Return the exact answer of the paintings, and the result of the search."""
 
@@ -347,9 +342,9 @@ class LightPlacer:
         return solution, placement
 
 
-def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
+def _trial(sites: Mapping[str, Site]) -> protocol.TrialPlaces:
     """Return the trial places, for pages to mark."""
-    return TrialPlaces(
+    return protocol.TrialPlaces(
         positions={name: x.position for name, x in sites.items() if x.position is not None},
         directions={name: x.direction for name, x in sites.items() if x.direction is not None},
     )
@@ -368,11 +363,11 @@ def _freedom_text(freedom: Freedom) -> str:
     return ", ".join(parts) or "stay"
 
 
-def _done(request: PlaceLights) -> str:
+def _done(request: protocol.PlaceLights) -> str:
     return "moved" if request.new_type is None else "added"
 
 
-def _outdated(request: PlaceLights) -> str:
+def _outdated(request: protocol.PlaceLights) -> str:
     return f"No light was {_done(request)}: lights were moved by hand meanwhile."
 
 

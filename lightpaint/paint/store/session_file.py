@@ -26,6 +26,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import LightpaintError, OutputError, PaintError
+from lightpaint.paint.store import stored_arrays
 from lightpaint.paint.store.compression import pack_patches, pack_pixels, unpack_pixels
 from lightpaint.paint.store.database import (
     DAMAGE_ERRORS,
@@ -39,21 +40,6 @@ from lightpaint.paint.store.database import (
 )
 from lightpaint.paint.store.history_steps import Identity, Pixels, Region, Step, StoredLook
 from lightpaint.paint.store.recovery import recover_or_raise
-from lightpaint.paint.store.stored_arrays import (
-    LookArrays,
-    StepAnswer,
-    StoredArrays,
-    delete_look,
-    insert_answer,
-    insert_look,
-    insert_step,
-    look_rows,
-    pack_arrays,
-    places_json,
-    read_position,
-    step_rows,
-    to_json,
-)
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Version of the composition of layers: to be raised when layers come to other bits.
@@ -188,7 +174,7 @@ class Store:
         self._looks: dict[int, StoredLook] = {}
         self._ids: list[int] = []  # of the steps; they only grow
         self._last = 0  # id of the last step there ever was
-        self._arrays = StoredArrays(path, self._lock, lambda: self._database)
+        self._arrays = stored_arrays.StoredArrays(path, self._lock, lambda: self._database)
         self.remarks: list[str] = []
         try:
             self._open_file()
@@ -264,7 +250,7 @@ class Store:
         """Append `step` after those that are done; undone steps are cut off."""
         with self._lock:
             patches = step.patches
-            fields, places = to_json(step.fields), places_json(patches)
+            fields, places = stored_arrays.to_json(step.fields), stored_arrays.places_json(patches)
             blobs = pack_patches(patches) if patches else None
             del self.steps[self.position :], self._ids[self.position :]
             last_kept = self._ids[-1] if self._ids else 0
@@ -276,7 +262,9 @@ class Store:
             self.position += 1
 
             row = (number, step.kind, step.label, fields, places)
-            self.enqueue(partial(insert_step, row=row, blobs=blobs, last_kept=last_kept))
+            self.enqueue(
+                partial(stored_arrays.insert_step, row=row, blobs=blobs, last_kept=last_kept)
+            )
 
     def move_to(self, position: int) -> None:
         """Undo or redo steps: `position` of them are done."""
@@ -296,7 +284,7 @@ class Store:
         """Id of the last step that is done; 0 before the first."""
         return self._ids[self.position - 1] if self.position else 0
 
-    def put_answer(self, answer: StepAnswer) -> None:
+    def put_answer(self, answer: stored_arrays.StepAnswer) -> None:
         """Keep the answer after the last step that is done.
 
         It is written with what is written next: a session that ends before that lacks it.
@@ -305,10 +293,12 @@ class Store:
             self._arrays.keep_answer(self.last_id, answer)
             fields, picture = answer.packed()
             self._queue.add(
-                partial(insert_answer, step=self.last_id, fields=fields, picture=picture)
+                partial(
+                    stored_arrays.insert_answer, step=self.last_id, fields=fields, picture=picture
+                )
             )
 
-    def answer(self, step: int) -> StepAnswer | None:
+    def answer(self, step: int) -> stored_arrays.StepAnswer | None:
         """Return the answer after a step by its id, 0 for the beginning; None without one."""
         return self._arrays.answer(step)
 
@@ -325,13 +315,18 @@ class Store:
     def put_look(self, look: StoredLook) -> None:
         """Keep a look, replacing the one of its number if there is one."""
         with self._lock:
-            fields, arrays = to_json(look.fields), look.arrays
+            fields, arrays = stored_arrays.to_json(look.fields), look.arrays
             number, blobs = look.id, None
-            if not (isinstance(arrays, LookArrays) and arrays.matches(self._arrays, number)):
-                blobs = pack_arrays(arrays)
+            if not (
+                isinstance(arrays, stored_arrays.LookArrays)
+                and arrays.matches(self._arrays, number)
+            ):
+                blobs = stored_arrays.pack_arrays(arrays)
                 self._arrays.keep_look(number, blobs)
             self._looks[number] = self._make_look(number, fields)
-            self.enqueue(partial(insert_look, number=number, fields=fields, arrays=blobs))
+            self.enqueue(
+                partial(stored_arrays.insert_look, number=number, fields=fields, arrays=blobs)
+            )
 
     def drop_look(self, number: int) -> None:
         """Forget a look. Raises PaintError if there is none of that number."""
@@ -339,7 +334,7 @@ class Store:
             if self._looks.pop(number, None) is None:
                 raise PaintError(f"no look {number}")
             self._arrays.drop_look(number)
-            self.enqueue(partial(delete_look, number=number))
+            self.enqueue(partial(stored_arrays.delete_look, number=number))
 
     def put_compositions(
         self,
@@ -403,13 +398,13 @@ class Store:
 
     def _read_all(self) -> None:
         """Read all of the file but pixels."""
-        for row in step_rows(self._database):
+        for row in stored_arrays.step_rows(self._database):
             self.steps.append(self._make_step(*row))
             self._ids.append(row[0])
         self._last = self._ids[-1] if self._ids else 0
-        position = read_position(self._database)
+        position = stored_arrays.read_position(self._database)
         self.position = len(self.steps) if position is None else min(position, len(self.steps))
-        for number, fields in look_rows(self._database):
+        for number, fields in stored_arrays.look_rows(self._database):
             self._looks[number] = look = self._make_look(number, fields)
             if not isinstance(look.fields["name"], str):
                 raise TypeError("a look without a name")
@@ -419,7 +414,9 @@ class Store:
         return Step(str(kind), str(label), strict_json(fields), patches)
 
     def _make_look(self, number: int, fields: str) -> StoredLook:
-        return StoredLook(number, strict_json(fields), LookArrays(self._arrays, number))
+        return StoredLook(
+            number, strict_json(fields), stored_arrays.LookArrays(self._arrays, number)
+        )
 
 
 class MemoryStore(Store):

@@ -10,24 +10,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, get_args
 
+from lightpaint import lighting
 from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting import (
-    Solution,
-    analyse,
-    can_change_colors,
-    mean_shares,
-    measure_deliveries,
-    worst_delivery,
-)
+from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import ExactSolveLoop, LatestWork
-from lightpaint.paint.protocol import (
-    AnswerChoice,
-    AnswerChoices,
-    AnswerColors,
-    AnswerUpdate,
-    Findings,
-)
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import judge, wish_delivery
@@ -59,16 +46,16 @@ class ExactAnswers:
     """
 
     def __init__(
-        self, links: StudioLinks, solved: Callable[[SessionSnapshot, Solution], None]
+        self, links: StudioLinks, solved: Callable[[SessionSnapshot, lighting.Solution], None]
     ) -> None:
         self._access, self._publisher, _ = links
         self._solved = solved
-        self._last: AnswerUpdate | None = None
+        self._last: protocol.AnswerUpdate | None = None
         self._keep_at = time.monotonic() + KEEP_INTERVAL_S
         self._loop = ExactSolveLoop(self._solve, self._publisher.publish)
         self.run, self.stop, self.notify = self._loop.run, self._loop.stop, self._loop.notify
 
-    def findings_of(self, session: Session) -> Findings:
+    def findings_of(self, session: Session) -> protocol.Findings:
         """Return the findings about the current answer, from its analysis if there is one."""
         last = self._last
         if last is not None and last.version == session.version:
@@ -93,15 +80,15 @@ class ExactAnswers:
             if solution is None:
                 return
             check()
-            judgement = judge(analyse(solution), snapshot.painted_views)
+            judgement = judge(lighting.analyse(solution), snapshot.painted_views)
             self._publish(lambda: session.accept_solution(snapshot, solution, judgement))
             self._solved(snapshot, solution)
             if time.monotonic() >= self._keep_at:
                 self._keep_at = time.monotonic() + KEEP_INTERVAL_S
                 self._access.keep_compositions()
 
-    def _publish(self, make: Callable[[], AnswerUpdate | None]) -> None:
-        def remember() -> AnswerUpdate | None:
+    def _publish(self, make: Callable[[], protocol.AnswerUpdate | None]) -> None:
+        def remember() -> protocol.AnswerUpdate | None:
             message = make()
             self._last = message or self._last
             return message
@@ -122,20 +109,20 @@ class ChoiceSolver:
     ) -> None:
         self._access, self._publisher, _ = links
         self._clean_planes = clean_planes
-        self._last: AnswerChoices | None = None
+        self._last: protocol.AnswerChoices | None = None
         self._loop = LatestWork(self._solve, self._publisher.publish)
         self.run, self.stop = self._loop.run, self._loop.stop
 
-    def give(self, snapshot: SessionSnapshot, solution: Solution) -> None:
+    def give(self, snapshot: SessionSnapshot, solution: lighting.Solution) -> None:
         """Replace the exact answer to which there are to be others."""
         self._loop.give((snapshot, solution))
 
-    def choices_at(self, version: int) -> tuple[AnswerChoice, ...]:
+    def choices_at(self, version: int) -> tuple[protocol.AnswerChoice, ...]:
         """Return the choices of a version of the session; none if they are of another."""
         is_current = self._last is not None and self._last.version == version
         return self._last.choices if self._last is not None and is_current else ()
 
-    def _solve(self, answer: tuple[SessionSnapshot, Solution]) -> None:
+    def _solve(self, answer: tuple[SessionSnapshot, lighting.Solution]) -> None:
         """Solve for the other choices, and publish all of them with their pictures."""
         snapshot, solution = answer
 
@@ -145,9 +132,13 @@ class ChoiceSolver:
 
         with suppress(OutdatedError), cancellable(check):
             check()
-            solutions = solve_choices(snapshot, solution) if can_change_colors(solution) else {}
+            solutions = (
+                solve_choices(snapshot, solution) if lighting.can_change_colors(solution) else {}
+            )
             choices = tuple(
-                AnswerChoice(colors=colors, is_chosen=x is solution, **_choice_figures(snapshot, x))
+                protocol.AnswerChoice(
+                    colors=colors, is_chosen=x is solution, **_choice_figures(snapshot, x)
+                )
                 for colors, x in solutions.items()
             )
             pictures = {
@@ -161,9 +152,9 @@ class ChoiceSolver:
     def _message(
         self,
         snapshot: SessionSnapshot,
-        choices: tuple[AnswerChoice, ...],
+        choices: tuple[protocol.AnswerChoice, ...],
         pictures: dict[str, Picture],
-    ) -> AnswerChoices | None:
+    ) -> protocol.AnswerChoices | None:
         """Store the pictures, and return the message; None if the session has changed since."""
         if self._access.version != snapshot.version:
             return None
@@ -171,11 +162,13 @@ class ChoiceSolver:
         for name, picture in pictures.items():
             table.put(name, picture)
         resources = {name: table.generations[name] for name in pictures}
-        self._last = AnswerChoices(version=snapshot.version, choices=choices, resources=resources)
+        self._last = protocol.AnswerChoices(
+            version=snapshot.version, choices=choices, resources=resources
+        )
         return self._last
 
     def _pictures(
-        self, snapshot: SessionSnapshot, colors: AnswerColors, solution: Solution
+        self, snapshot: SessionSnapshot, colors: protocol.AnswerColors, solution: lighting.Solution
     ) -> list[tuple[str, Picture]]:
         """Return the names and pictures of a choice, (h, w, 3) uint8, of all views."""
         weights = snapshot.requests.output(solution.weights, snapshot.bases[0].is_fixed)
@@ -191,13 +184,15 @@ class ChoiceSolver:
         ]
 
 
-def solve_choices(snapshot: SessionSnapshot, solution: Solution) -> dict[AnswerColors, Solution]:
+def solve_choices(
+    snapshot: SessionSnapshot, solution: lighting.Solution
+) -> dict[protocol.AnswerColors, lighting.Solution]:
     """Return the exact answer with each choice of colours; none for one that is impossible.
 
     solution: the exact answer to `snapshot`, with its own choice.
     """
-    solutions: dict[AnswerColors, Solution] = {}
-    for colors in get_args(AnswerColors):
+    solutions: dict[protocol.AnswerColors, lighting.Solution] = {}
+    for colors in get_args(protocol.AnswerColors):
         if solution.problem.fit.colors == colors:
             solutions[colors] = solution
             continue
@@ -206,12 +201,12 @@ def solve_choices(snapshot: SessionSnapshot, solution: Solution) -> dict[AnswerC
     return solutions
 
 
-def _choice_figures(snapshot: SessionSnapshot, solution: Solution) -> dict[str, Any]:
+def _choice_figures(snapshot: SessionSnapshot, solution: lighting.Solution) -> dict[str, Any]:
     """Return the fields of `AnswerChoice` that say what an answer delivers."""
     picture = solution.basis.mix(solution.weights)
-    deliveries = measure_deliveries(solution, picture).deliveries
-    brightness, color = mean_shares(deliveries)
-    worst = worst_delivery(deliveries)
+    deliveries = lighting.measure_deliveries(solution, picture).deliveries
+    brightness, color = lighting.mean_shares(deliveries)
+    worst = lighting.worst_delivery(deliveries)
     return {
         "delta_e": snapshot.delta_e(solution),
         "brightness": brightness,

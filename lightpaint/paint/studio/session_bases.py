@@ -24,28 +24,9 @@ from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.rig.light_mover import LightMover
+from lightpaint.paint.session import picture_table, session_state
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.painting_session import Session
-from lightpaint.paint.session.picture_table import (
-    Picture,
-    has_mixes,
-    opens_plain,
-    page_emitters,
-    page_factor,
-    plane_scale,
-    plane_size,
-    plane_thumbnail,
-)
-from lightpaint.paint.session.session_state import (
-    offer_layers,
-    offer_lights_at,
-    offer_presets,
-    offer_references,
-    offer_steps,
-    offer_transforms,
-    offer_view,
-    offered_transforms,
-)
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import Identity, name_in_view
@@ -86,7 +67,7 @@ class PlaneDenoiser:
 
     def __init__(
         self,
-        publish: Callable[[str, Picture], None],
+        publish: Callable[[str, picture_table.Picture], None],
         is_needed: Callable[[], bool],
         *,
         use_cache: bool,
@@ -101,7 +82,7 @@ class PlaneDenoiser:
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
             # Planes of many lights are looked for while the page can be used already.
-            is_looked_for = self._use_cache and not opens_plain(basis)
+            is_looked_for = self._use_cache and not picture_table.opens_plain(basis)
             cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
                 current_looks.append(_clean_look(basis))
@@ -144,16 +125,20 @@ class PlaneDenoiser:
         for view, basis in zip(session.views, session.bases, strict=True):
             planes_of_view = self._by_view.get(view.view)
             is_missing = planes_of_view is None or not planes_of_view.matches(basis)
-            if is_missing and not has_mixes(basis):
+            if is_missing and not picture_table.has_mixes(basis):
                 self._denoise_view(session, view, basis)
 
     def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
-        n, factor, emitters = len(basis.lights), page_factor(basis), page_emitters(basis)
+        n, factor, emitters = (
+            len(basis.lights),
+            picture_table.page_factor(basis),
+            picture_table.page_emitters(basis),
+        )
         is_cached = False
         planes = DenoisedPlanes(
-            np.empty((n, *plane_size(basis), 3), np.float16), np.ones(n), view.current
+            np.empty((n, *picture_table.plane_size(basis), 3), np.float16), np.ones(n), view.current
         )
-        if opens_plain(basis) and self._use_cache:
+        if picture_table.opens_plain(basis) and self._use_cache:
             cached = read_denoised_planes(basis, factor=factor)
             if cached is not None and cached.halves.shape == planes.halves.shape:
                 planes, is_cached = cached, True
@@ -164,7 +149,7 @@ class PlaneDenoiser:
                 planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k, factor)
             if basis.names[k] not in session.requests.placed:
                 self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
-                thumbnail = plane_thumbnail(planes.plane(k), emitters)
+                thumbnail = picture_table.plane_thumbnail(planes.plane(k), emitters)
                 self._publish(name_in_view(f"thumb/{k}", view.view), thumbnail)
         self._by_view[view.view] = _ViewPlanes(basis, planes, is_cached)
 
@@ -179,7 +164,7 @@ class PlaneDenoiser:
 
 def _clean_look(basis: Basis) -> Floats:
     """Return the denoised current look, (h, w, 3)."""
-    if not opens_plain(basis) or basis.former is not None:
+    if not picture_table.opens_plain(basis) or basis.former is not None:
         return denoise_current_look(basis)
     denoiser = "".join(denoiser_text(basis.features, raw="").values())
     name = array_name(f"clean look by {denoiser}", basis.current_weights)
@@ -253,8 +238,8 @@ class SessionBases:
     def _keep_openings(self, bases: Sequence[Basis]) -> None:
         """Keep the results of walks over all planes with which sessions of these bases begin."""
         for subject, basis in zip(self._subjects, bases, strict=True):
-            if subject.settings.use_cache and opens_plain(basis):
-                plane_scale(basis, 0)  # of all planes, for the pages
+            if subject.settings.use_cache and picture_table.opens_plain(basis):
+                picture_table.plane_scale(basis, 0)  # of all planes, for the pages
                 keep_opening(basis)
 
     def _open_session(
@@ -294,13 +279,13 @@ class SessionBases:
         session, pictures = self._access.session, self._publisher.pictures
         of_views = bases, clean_planes, small_planes
         for view, basis, clean, small in zip(session.views, *of_views, strict=True):
-            offer_view(pictures, view, basis, session.transform, clean, small)
-        offer_transforms(pictures, offered_transforms(session))
-        offer_layers(pictures, session.views)
-        offer_lights_at(pictures, session.views)
-        offer_presets(pictures, session.views[0], session.transform)
-        offer_references(pictures, session.references)
-        offer_steps(pictures, session.history.picture)
+            session_state.offer_view(pictures, view, basis, session.transform, clean, small)
+        session_state.offer_transforms(pictures, session_state.offered_transforms(session))
+        session_state.offer_layers(pictures, session.views)
+        session_state.offer_lights_at(pictures, session.views)
+        session_state.offer_presets(pictures, session.views[0], session.transform)
+        session_state.offer_references(pictures, session.references)
+        session_state.offer_steps(pictures, session.history.picture)
         self._mover.offer_all(session)
 
     def denoise(self) -> None:

@@ -14,14 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Position
 from lightpaint.lighting import Lighting, Solution
-from lightpaint.paint import protocol
-from lightpaint.paint.background_threads import (
-    BackgroundThreads,
-    StoppedError,
-    UnsavedRetry,
-    error_text,
-    lower_priority,
-)
+from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.protocol import (
     Message,
     Notice,
@@ -89,7 +82,7 @@ class Studio:
         self.failure: Exception | None = None
         self._access = access = SessionAccess()
         self.publisher = publisher = Publisher(access.lock)
-        self._threads = BackgroundThreads(publisher.publish)
+        self._threads = background_threads.BackgroundThreads(publisher.publish)
         links = StudioLinks(access, publisher, self._threads)
         self.rig = LampRig(self.subjects)
         denoiser = PlaneDenoiser(
@@ -120,7 +113,9 @@ class Studio:
             find_directions=self._directions if self.has_scenes else None,
             warn=lambda text: publisher.publish(Notice(text=text, tone="warn")),
         )
-        self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
+        self._write_retry = background_threads.UnsavedRetry(
+            lambda: self.store, self._publish_save_state
+        )
         self._comparison = LookComparison(links, self._mover)
         self._mixes = MixedPictures(links)
         self._jobs = BackgroundJobs(links, self._mover, clean_planes=denoiser.clean_planes)
@@ -407,11 +402,11 @@ class Studio:
 
     def _obtain_bases(self) -> None:
         """Obtain bases of more and more samples, and denoise each."""
-        lower_priority()
+        background_threads.lower_priority()
         try:
             self._bases.obtain()
             self._sampling.run()
-        except StoppedError:
+        except background_threads.StoppedError:
             pass
         except Exception as error:
             self._fail(error)
@@ -420,7 +415,7 @@ class Studio:
         """Report that bases cannot be obtained; without any, there is nothing to paint."""
         has_session = self._access.current is not None
         is_reported = not has_session and self.on_failure is not None
-        self._access.failure_text = error_text(error, at_length=not is_reported)
+        self._access.failure_text = background_threads.error_text(error, at_length=not is_reported)
         self.publisher.publish(Notice(text=self._access.failure_text, tone="warn"))
         if not has_session:
             self.failure = error

@@ -3,21 +3,12 @@
 from dataclasses import dataclass
 from typing import Annotated, TypedDict
 
+from lightpaint import validation
 from lightpaint.errors import LightpaintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Colors, Emitters, Fit, Method, Space
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.sentences import Hint
-from lightpaint.validation import (
-    MAX_SPP,
-    MAX_TEXELS,
-    Option,
-    a,
-    between,
-    number,
-    parse_share,
-    whole,
-)
 
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
@@ -101,7 +92,7 @@ class Settings(Fit):
 
     resize: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--resize",
             "resample a target whose size differs from the basis",
             default="refuse it",
@@ -111,13 +102,15 @@ class Settings(Fit):
     # The noise is estimated from two halves of the samples.
     spp: Annotated[
         int | None,
-        whole(2, MAX_SPP),
-        Option("--spp N", "samples per pixel", default="the scene's", theme="How much to render"),
+        validation.whole(2, validation.MAX_SPP),
+        validation.Option(
+            "--spp N", "samples per pixel", default="the scene's", theme="How much to render"
+        ),
     ] = None
     time_s: Annotated[
         float | None,
-        number("seconds"),
-        Option(
+        validation.number("seconds"),
+        validation.Option(
             "--time SECONDS",
             "seconds to render the basis, instead of --spp. They include compilation, but not "
             "the verification; samples of earlier runs are added",
@@ -126,25 +119,27 @@ class Settings(Fit):
     ] = None
     error: Annotated[
         float | None,
-        between(MIN_ERROR, 1, "a share"),
-        Option(
+        validation.between(MIN_ERROR, 1, "a share"),
+        validation.Option(
             "--error SHARE",
             "render until no visible light has a larger error than this, like 2%%, instead of "
             "--spp: 16 samples per pixel come first, then more where the painting needs them; "
             "--time limits the seconds",
             theme="How much to render",
-            parse=parse_share,
+            parse=validation.parse_share,
         ),
     ] = None
     seed: Annotated[
         int,
-        whole(0),
-        Option("--seed S", "random seed", default="%(default)s", theme="How much to render"),
+        validation.whole(0),
+        validation.Option(
+            "--seed S", "random seed", default="%(default)s", theme="How much to render"
+        ),
     ] = 0
     resolution: Annotated[
         str | None,
-        a(str, "a part of the film like '1/4' or '320x180'"),
-        Option(
+        validation.a(str, "a part of the film like '1/4' or '320x180'"),
+        validation.Option(
             "--resolution 1/N|WxH",
             "render one pixel for each square block of film pixels, like 1/4 or 320x180; "
             "incomplete blocks at the right and bottom edges are left out",
@@ -154,7 +149,7 @@ class Settings(Fit):
     ] = None
     quality: Annotated[
         Quality | None,
-        Option(
+        validation.Option(
             "--quality",
             "preview: 32 samples per pixel on about 30,000 pixels, each of which is a block of "
             "film pixels; final: 256 on the whole film. --spp, --time and --resolution take "
@@ -164,7 +159,7 @@ class Settings(Fit):
     ] = None
     use_cache: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--no-cache",
             "do not use bases of earlier runs, and do not keep this one",
             default="do both",
@@ -173,7 +168,7 @@ class Settings(Fit):
     ] = True
     exact_spp: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--exact-spp",
             "use exactly the requested samples per pixel, even if the cache has a basis with more",
             default="use that one",
@@ -182,7 +177,7 @@ class Settings(Fit):
     ] = False
     noise_correction: Annotated[
         bool | None,
-        Option(
+        validation.Option(
             "--correct-noise",
             "subtract the power of the noise from the equations as far as that helps, so that "
             "the answer is closer to one from many samples",
@@ -192,8 +187,8 @@ class Settings(Fit):
     ] = None
     refine: Annotated[
         int,
-        whole(0, MAX_REFINE),
-        Option(
+        validation.whole(0, MAX_REFINE),
+        validation.Option(
             "--refine K",
             "render the solved scene K times, with as many samples as the basis, and improve the "
             "answer each time",
@@ -203,8 +198,8 @@ class Settings(Fit):
     ] = 0
     suggest: Annotated[
         int,
-        whole(0, MAX_SUGGEST),
-        Option(
+        validation.whole(0, MAX_SUGGEST),
+        validation.Option(
             "--suggest N",
             "suggest up to N (3) new point lights that would help most, with XML to paste, and "
             "the best turn of one spot of the scene; takes about half a minute",
@@ -215,8 +210,8 @@ class Settings(Fit):
     ] = 0
     sun: Annotated[
         int | None,
-        whole(0, MAX_TEXELS),
-        Option(
+        validation.whole(0, validation.MAX_TEXELS),
+        validation.Option(
             "--sun N",
             "find a sun in a sky that is split: split its texels again where the painting gains "
             "most by it, into N (72) more at most, 24 at a time",
@@ -227,7 +222,7 @@ class Settings(Fit):
     ] = None
     spectral: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--spectral",
             "render with the spectra of the emitters in the lights file, one picture for each, "
             "which shows what LEDs do to colours; takes about three times as long",
@@ -237,8 +232,8 @@ class Settings(Fit):
     ] = False
     observer: Annotated[
         str | None,
-        a(str, "the path of a table of sensitivities"),
-        Option(
+        validation.a(str, "the path of a table of sensitivities"),
+        validation.Option(
             "--observer FILE",
             "with --spectral: the camera that sees the picture, by a table of nanometres and the "
             "sensitivities of red, green and blue",
@@ -248,7 +243,7 @@ class Settings(Fit):
     ] = None
     move_lights: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--no-move",
             "keep all lights in place, even if the lights file lets them move",
             theme="Lights",
@@ -256,7 +251,7 @@ class Settings(Fit):
     ] = True
     animate: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--animate",
             "of a shot with several painted frames: find a lighting for each, and lights that "
             "change smoothly between them",
@@ -266,8 +261,8 @@ class Settings(Fit):
     ] = False
     cd_per_unit: Annotated[
         float | None,
-        number("cd/m²"),
-        Option(
+        validation.number("cd/m²"),
+        validation.Option(
             "--unit CD/M2",
             "luminance in cd/m² of a radiance of 1 in the scene, to show lumen, candela and lux",
             default="relative numbers without units",
@@ -276,8 +271,8 @@ class Settings(Fit):
     ] = None
     planes: Annotated[
         str | None,
-        a(str, "the path of a planes file"),
-        Option(
+        validation.a(str, "the path of a planes file"),
+        validation.Option(
             "--planes FILE",
             "measuring planes, with the illuminance that is wished for: the lighting that comes "
             "closest to the painting and meets it (docs/photometry.md)",
@@ -287,8 +282,8 @@ class Settings(Fit):
     ] = None
     watts: Annotated[
         float | None,
-        number("W"),
-        Option(
+        validation.number("W"),
+        validation.Option(
             "--watts W",
             "largest power of all lamps together, whose emitters have watts in the lights file",
             default="no limit, or the limit of the planes file",
@@ -297,7 +292,7 @@ class Settings(Fit):
     ] = None
     ignore_wishes: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--ignore-wishes",
             "only the painting counts: the report says what planes and power come to, and their "
             "wishes and limits do not bind",
@@ -307,7 +302,7 @@ class Settings(Fit):
     ] = False
     verify: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--no-verify",
             "do not render the relit scene",
             default="render it with at most the samples of the basis, and only a part of the film "
@@ -317,8 +312,8 @@ class Settings(Fit):
     ] = True
     verify_spp: Annotated[
         int | None,
-        whole(2, MAX_SPP),
-        Option(
+        validation.whole(2, validation.MAX_SPP),
+        validation.Option(
             "--verify-spp N",
             "samples per pixel of the verification, which then covers the whole film, however "
             "long it takes",
@@ -327,7 +322,7 @@ class Settings(Fit):
     ] = None
     report: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--no-report",
             "write neither report.html nor comparison.png, only the numbers",
             default="write them",
@@ -336,14 +331,14 @@ class Settings(Fit):
     ] = True
     force: Annotated[
         bool,
-        Option(
+        validation.Option(
             "--force",
             "replace results of another painting, and results changed by hand",
             default="refuse",
             theme="Results",
         ),
     ] = False
-    command: Annotated[str, a(str, "the text of a shell command")] = ""
+    command: Annotated[str, validation.a(str, "the text of a shell command")] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,23 +21,7 @@ from lightpaint.errors import ConstraintError, LightpaintError, SceneError, Targ
 from lightpaint.files import check_writable
 from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.pipeline.job.job_checks import (
-    check_animation,
-    check_inputs,
-    check_painting_is_no_light,
-    check_places,
-    checked_scale,
-    remarks_of_film,
-    remarks_of_memory,
-    remarks_of_pictures,
-    remarks_of_scene,
-    remarks_of_target,
-    remarks_on_spectra,
-    rigging_for,
-    sky_for_sun,
-    wanted_sun,
-    with_same_lights,
-)
+from lightpaint.pipeline.job import job_checks
 from lightpaint.pipeline.job.job_record import decode_job, encode_job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
@@ -150,14 +134,14 @@ class Job:
     def __post_init__(self) -> None:
         self._set(folder=Path(self.folder))
         given = self.given_bases
-        check_inputs(self.scenes, self.targets, given, self.constraints, self.settings)
+        job_checks.check_inputs(self.scenes, self.targets, given, self.constraints, self.settings)
         if not self.scenes:
             check_nothing_unused(self.settings, given[0])
         # Paintings and bases are read in parallel; an error in a painting is reported first.
         contents = parallel_map(content, [*self.targets, *given])
         targets, read = (
             contents[: len(self.targets)],
-            with_same_lights(contents[len(self.targets) :]),
+            job_checks.with_same_lights(contents[len(self.targets) :]),
         )
         groups = (x for x in read if isinstance(x, LightGroups))
         self._set(all_groups=tuple(replace(x, sequence=self.sequence) for x in groups))
@@ -170,7 +154,7 @@ class Job:
             names = names or names_of_views(scenes, bases, self.all_groups)
             folders = [self.folder / name for name in names]
         for basis, target in zip(given, self.targets, strict=False):
-            check_painting_is_no_light(basis, target)
+            job_checks.check_painting_is_no_light(basis, target)
         source = scenes[0] if scenes else bases[0]
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
@@ -185,8 +169,8 @@ class Job:
             scenes = [spectral_scene(scene, all_constraints, observer) for scene in scenes]
         if scenes and bases:
             check_same_view(scenes[0], bases[0])
-        check_places(self.placement, scenes)
-        check_animation(self.settings, all_constraints, len(self.painted_frames))
+        job_checks.check_places(self.placement, scenes)
+        job_checks.check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         lights = self._lights(scenes, bases)
         # Which lights reach planes is known after these are measured.
@@ -197,12 +181,12 @@ class Job:
         if self.settings.watts is not None:
             lighting.check_powers(reduction, [light.name for light in lights], "a limit of power")
         if self.settings.planes is not None:
-            checked_scale(self.settings.planes, all_constraints.cd_per_unit)
-        if scenes and (count := wanted_sun(self.settings, scenes)):
-            sky_for_sun(scenes[0], count)
+            job_checks.checked_scale(self.settings.planes, all_constraints.cd_per_unit)
+        if scenes and (count := job_checks.wanted_sun(self.settings, scenes)):
+            job_checks.sky_for_sun(scenes[0], count)
         if self.settings.suggest:
             check_suggestible(scenes[0])
-        all_rigging = rigging_for(self.rigging, scenes, self.settings)
+        all_rigging = job_checks.rigging_for(self.rigging, scenes, self.settings)
         check_spectral(self.settings, all_constraints, all_rigging, self.placement)
         views = painted_views(scenes, targets, bases, folders, self.settings)
         if self.all_groups:
@@ -352,19 +336,21 @@ class Job:
             remarks.append(remark)
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
-            remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
+            remarks += job_checks.remarks_of_scene(first, is_rendered=bool(rendered_scenes))
             remarks += filter(None, [plugin_remark(first)])
         films = [scene.size for scene in scenes] if rendered_scenes else [None] * len(targets)
         for target, view, film in zip(targets, self.views, films, strict=True):
-            remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)
+            remarks += job_checks.remarks_of_target(
+                target, view.target.size, view.scene, self.fit, film=film
+            )
         for scene in rendered_scenes[:1]:
-            remarks += remarks_on_spectra(scene, self.all_constraints)
+            remarks += job_checks.remarks_on_spectra(scene, self.all_constraints)
         for scene in rendered_scenes:
             remarks += [
-                *remarks_of_film(scene, self.settings),
-                *remarks_of_memory(scene, self.settings.basis_spp),
+                *job_checks.remarks_of_film(scene, self.settings),
+                *job_checks.remarks_of_memory(scene, self.settings.basis_spp),
             ]
-        return remarks + remarks_of_pictures()
+        return remarks + job_checks.remarks_of_pictures()
 
 
 def names_of_views(

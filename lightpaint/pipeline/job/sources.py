@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+from lightpaint import lighting
 from lightpaint.arrays import Floats
 from lightpaint.basis import (
     Basis,
@@ -22,15 +23,6 @@ from lightpaint.basis.render import basis_lights, check_renders_spectra
 from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError
 from lightpaint.keywords import keywords
-from lightpaint.lighting import (
-    Constraints,
-    FullLamp,
-    WholeLamps,
-    constraints_of,
-    full_lamps,
-    lamps_by_name,
-    with_scale,
-)
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.scene import Scene, load_scene, part_name
@@ -119,7 +111,7 @@ class SceneFile(ReadOnce):
         scene = with_full_lamps(load_scene(**fields))
         if not spectral:
             return scene
-        return spectral_scene(scene, constraints_of(scene.requests), observer_of(observer))
+        return spectral_scene(scene, lighting.constraints_of(scene.requests), observer_of(observer))
 
     @property
     def read_files(self) -> tuple[Path, ...]:
@@ -269,18 +261,22 @@ def observer_of(path: str | None) -> Observer:
     return EYE if path is None else read_observer(Path(path))
 
 
-def scaled_constraints(scene: Scene, cd_per_unit: float | None = None) -> Constraints:
+def scaled_constraints(scene: Scene, cd_per_unit: float | None = None) -> lighting.Constraints:
     """Return the constraints of a scene's lights file, with the scale of its lights. cd_per_unit:
     if it is given. Raises ConstraintError.
     """
-    constraints = constraints_of(scene.requests).and_then(Constraints(cd_per_unit=cd_per_unit))
-    return with_scale(constraints, basis_lights(scene))
+    constraints = lighting.constraints_of(scene.requests).and_then(
+        lighting.Constraints(cd_per_unit=cd_per_unit)
+    )
+    return lighting.with_scale(constraints, basis_lights(scene))
 
 
-def lamps_of_scene(scene: Scene, constraints: Constraints) -> Mapping[str, FullLamp]:
+def lamps_of_scene(
+    scene: Scene, constraints: lighting.Constraints
+) -> Mapping[str, lighting.FullLamp]:
     """Return the lamps at full, by light. constraints: that make them. Raises ConstraintError."""
     lights = basis_lights(scene)
-    return {lights[k].name: x for k, x in full_lamps(constraints, lights).items()}
+    return {lights[k].name: x for k, x in lighting.full_lamps(constraints, lights).items()}
 
 
 def with_full_lamps(scene: Scene) -> Scene:
@@ -299,7 +295,9 @@ def with_full_lamps(scene: Scene) -> Scene:
     return scene
 
 
-def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = EYE) -> Scene:
+def spectral_scene(
+    scene: Scene, constraints: lighting.Constraints, observer: Observer = EYE
+) -> Scene:
     """Return a scene with a light for each emitter of its lamps, as the observer sees it.
 
     One that has them already, which looks of a batch share, has to have the spectra of
@@ -310,14 +308,14 @@ def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = 
         _check_same_emitters(scene, constraints)
         return scene
     check_renders_spectra(scene)
-    return scene.with_lamps(lamps_by_name(constraints, basis_lights(scene)), observer)
+    return scene.with_lamps(lighting.lamps_by_name(constraints, basis_lights(scene)), observer)
 
 
-def _check_same_emitters(scene: Scene, constraints: Constraints) -> None:
+def _check_same_emitters(scene: Scene, constraints: lighting.Constraints) -> None:
     """Raise SceneError if constraints give lamps other spectra than the spectra of a spectral
     scene."""
-    lights = WholeLamps.of(basis_lights(scene)).lights
-    lamps = lamps_by_name(constraints, lights)
+    lights = lighting.WholeLamps.of(basis_lights(scene)).lights
+    lamps = lighting.lamps_by_name(constraints, lights)
     expected = {
         part_name(name, x.name): x.spectrum for name, lamp in lamps.items() for x in lamp.emitters
     }
@@ -329,7 +327,7 @@ def _check_same_emitters(scene: Scene, constraints: Constraints) -> None:
         )
 
 
-def check_spectral(settings: Settings, constraints: Constraints, *others: object) -> None:
+def check_spectral(settings: Settings, constraints: lighting.Constraints, *others: object) -> None:
     """Raise LightpaintError for what does not go with spectra. others: what moves or adds lights;
     false if there is nothing.
     """

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint import report
 from lightpaint.basis import Basis, Origin
 from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import rounded_text, some_names
@@ -35,21 +36,6 @@ from lightpaint.placement import (
 )
 from lightpaint.progress import Progress, silent
 from lightpaint.relit import EXPORTS, Verification, verify
-from lightpaint.report import (
-    CleanLooks,
-    HungLights,
-    LightChange,
-    ReportedAnswer,
-    comparison_image,
-    emitter_remarks,
-    hung_lights,
-    report_numbers,
-    report_page,
-    report_transform,
-    residual_of,
-    spoken_fraction,
-    verdict,
-)
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.scene import Scene, Stream, load_scene, render_features
 from lightpaint.storage.json_records import read_record, strict_json
@@ -138,7 +124,7 @@ class Look:
     @property
     def verdict(self) -> str:
         """Sentences on how close the lights come to the painting."""
-        return verdict(
+        return report.verdict(
             self.solution, self.predicted, self.verification, appearance=self.analysis.appearance
         )
 
@@ -155,7 +141,7 @@ class Look:
     @property
     def remarks(self) -> list[str]:
         """Remarks on emitters in view: painted pixels that are ignored."""
-        return emitter_remarks(self.target, self.solution, self.predicted)
+        return report.emitter_remarks(self.target, self.solution, self.predicted)
 
     @property
     def lighting(self) -> Lighting:
@@ -226,7 +212,7 @@ def write_report(
     relit = relit or look.relit
     answer = _reported_answer(look, command)
     if not is_shown:
-        write_text(folder / "report.json", report_numbers(answer))
+        write_text(folder / "report.json", report.report_numbers(answer))
         return
     verified = look.verification.verified.image if look.verification else None
     larger_features = None
@@ -236,12 +222,14 @@ def write_report(
             film = relit if size == relit.size else relit.reduced(f"{width}x{height}")
             larger_features = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
-    looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger_features)
-    transform = report_transform(look.target, look.basis, predicted)
-    missed = residual_of(look.solution, predicted, transform=transform)
+    looks = report.CleanLooks.clean(
+        look.basis, weights, predicted, verified, larger=larger_features
+    )
+    transform = report.report_transform(look.target, look.basis, predicted)
+    missed = report.residual_of(look.solution, predicted, transform=transform)
 
     def comparison() -> None:
-        sheet = comparison_image(
+        sheet = report.comparison_image(
             basis=look.basis,
             target=look.target,
             solution=look.solution,
@@ -255,17 +243,17 @@ def write_report(
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(answer, looks=looks, missed=missed))
+        write_text(folder / "report.html", report.report_page(answer, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(answer, missed=missed))
+        write_text(folder / "report.json", report.report_numbers(answer, missed=missed))
 
     in_turns(lambda write: write(), (page, comparison, numbers), look.basis.size)
 
 
-def _reported_answer(look: Look, command: str) -> ReportedAnswer:
+def _reported_answer(look: Look, command: str) -> report.ReportedAnswer:
     """Return a look as its report takes it."""
-    return ReportedAnswer(
+    return report.ReportedAnswer(
         basis=look.basis,
         target=look.target,
         solution=look.solution,
@@ -367,14 +355,14 @@ def _read_view(path: Path, text: str) -> _RecordedView:
         ) from None
 
 
-def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
+def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> report.HungLights:
     """Return the changes of a placement and the lights of an answer; none without a placement."""
     changes = [_change_of(change) for change in all_changes(placement)]
     changes.sort(key=lambda change: -change.numbers["gain_share"])
     missed_shares = placement.missed_before, placement.missed_after
-    lights = () if lighting is None else hung_lights(lighting)
+    lights = () if lighting is None else report.hung_lights(lighting)
     up_axis = (0.0, 1.0, 0.0) if lighting is None else lighting.up
-    return HungLights(lights, tuple(changes), up_axis, *missed_shares, placement.looks)
+    return report.HungLights(lights, tuple(changes), up_axis, *missed_shares, placement.looks)
 
 
 def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
@@ -382,7 +370,7 @@ def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLigh
     return [*placement.moves, *placement.additions]
 
 
-def _change_of(change: Move | AddedLight) -> LightChange:
+def _change_of(change: Move | AddedLight) -> report.LightChange:
     numbers: dict[str, Any] = {
         "gain_share": change.gain_share,
         "place_error": change.place_error,
@@ -392,12 +380,12 @@ def _change_of(change: Move | AddedLight) -> LightChange:
     if isinstance(change, Move):
         numbers |= {"distance": change.distance, "turn": change.turn}
         numbers |= {"cutoff": change.new.cutoff, "beam": change.new.beam}
-    return LightChange(change.name, spoken_change(change), numbers)
+    return report.LightChange(change.name, spoken_change(change), numbers)
 
 
 def spoken_change(change: Move | AddedLight) -> str:
     """Return a light's change and gain: `spot_knot turned by 12°, slid by 0.6: a fifth …`."""
-    gain = f"{spoken_fraction(change.gain_share)} of what was missed"
+    gain = f"{report.spoken_fraction(change.gain_share)} of what was missed"
     if isinstance(change, Move):
         phrase, gain = spoken_move(change), change.shared_gain or gain
     else:

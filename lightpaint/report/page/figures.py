@@ -15,14 +15,7 @@ from lightpaint.images import denoised
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import Solution
 from lightpaint.relit.verification import LIMIT, Verification
-from lightpaint.report.answer_pictures import (
-    DIVERGING,
-    Residual,
-    diverging,
-    importance_picture,
-    residual_of,
-    residual_picture,
-)
+from lightpaint.report import answer_pictures
 from lightpaint.report.page.html import html, piece
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.threads import parallel_map
@@ -34,7 +27,7 @@ UNCOUNTED_COLOR, COUNTED_COLOR = "#393939", "#e8d8a2"
 UNMEASURED = 0.22
 
 #: Colours of a signed quantity from its lower to its upper end, for the legend.
-SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
+SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(answer_pictures.DIVERGING)]
 
 #: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
 MAX_PNG_BYTES = 150_000
@@ -167,15 +160,17 @@ def maps(
     *,
     verification: Verification | None,
     transform: ViewTransform,
-    missed: Residual | None = None,
+    missed: answer_pictures.Residual | None = None,
 ) -> Markup:
     """Return false-colour pictures: the error, the importance, and where the render disagrees.
 
     predicted: (h, w, 3) linear, as rendered; current: background of pixels that do not count.
     missed: the result of `residual_of`.
     """
-    missed = missed or residual_of(solution, predicted, transform=transform)
-    picture = residual_picture(missed, solution, current, transform=transform, finish=to_8_bit)
+    missed = missed or answer_pictures.residual_of(solution, predicted, transform=transform)
+    picture = answer_pictures.residual_picture(
+        missed, solution, current, transform=transform, finish=to_8_bit
+    )
     figures = [
         figure(
             PagePicture("Residual", "False-colour map of the residual.", picture),
@@ -192,7 +187,9 @@ def maps(
 
 def _importance_map(importance: Floats, current: Floats, *, transform: ViewTransform) -> Markup:
     """Return the figure of how much each pixel counts. importance: (h, w)."""
-    picture = importance_picture(importance, current, transform=transform, finish=to_8_bit)
+    picture = answer_pictures.importance_picture(
+        importance, current, transform=transform, finish=to_8_bit
+    )
     return figure(
         PagePicture("Importance", "Map of how much each pixel counts.", picture),
         f"How much each pixel counts: {importance.mean():.2g} on average, "
@@ -225,7 +222,7 @@ def verification_picture(verification: Verification) -> tuple[npt.NDArray[np.uin
     shown.
     """
     z = verification.z.mean(axis=-1, dtype=np.float64)
-    colours, is_measured = diverging(z / LIMIT), verification.is_measured
+    colours, is_measured = answer_pictures.diverging(z / LIMIT), verification.is_measured
     if is_measured is None or not verification.agrees:
         return to_8_bit(colours), 0.0
     colours[~is_measured] = UNMEASURED

@@ -23,6 +23,7 @@ from lightpaint.lighting import (
     Uncertainty,
     renderings_of,
 )
+from lightpaint.report import phrases
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, cached_clean_planes, page_reduction
 from lightpaint.report.diagnosis_sentences import (
     UNDETERMINED,
@@ -33,13 +34,6 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
-from lightpaint.report.phrases import (
-    rendering_sentences,
-    spoken_lamp,
-    spoken_percent,
-    spoken_preference,
-    spoken_wheels,
-)
 
 #: Width of the map of an image in pixels.
 MAP_WIDTH = 144
@@ -56,7 +50,7 @@ def rendering_section(lighting: Lighting, surfaces: Sequence[SurfaceColor] = ())
     return html(
         "rendering",
         lamps=lamps,
-        sentences=rendering_sentences(found),
+        sentences=phrases.rendering_sentences(found),
         surfaces=[_surface(x) for x in surfaces],
     )
 
@@ -200,13 +194,16 @@ def lights_table(
         )
         note = (
             f"{len(other_indices)} more lights, each at most "
-            f"{spoken_percent(float(shares[other_indices].max()))} of the picture, now or as solved"
+            f"{phrases.spoken_percent(float(shares[other_indices].max()))} of the picture, now or "
+            "as solved"
         )
         shown = [rows[k] for k in visible_indices]
         folded = [(note, [rows[k] for k in other_indices])]
     has_scale = solution.lighting.cd_per_unit is not None
     lights = solution.lighting.lights
-    lead = " ".join(filter(None, (lead, spoken_preference(lights), spoken_wheels(lights))))
+    lead = " ".join(
+        filter(None, (lead, phrases.spoken_preference(lights), phrases.spoken_wheels(lights)))
+    )
     return html("lights", lead=lead, shown=shown, folded=folded, has_scale=has_scale)
 
 
@@ -337,7 +334,7 @@ def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
     note = " (limits it)" if setting.is_active else ""
     if setting.lamp is not None:
-        return f"{spoken_lamp(setting)}{note}"
+        return f"{phrases.spoken_lamp(setting)}{note}"
     return f"{setting.constraint}{note}" if setting.constraint else ""
 
 

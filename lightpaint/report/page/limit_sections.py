@@ -7,37 +7,14 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from lightpaint import lighting
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, luminance, to_8_bit
 from lightpaint.display_text import some_names
 from lightpaint.images import block_mean, by_bands, denoised
-from lightpaint.lighting import (
-    Appearance,
-    Bound,
-    Choices,
-    ColorChoice,
-    Colors,
-    Diagnosis,
-    Solution,
-    Uncertainty,
-)
-from lightpaint.report.answer_pictures import (
-    FINEST_SCALE,
-    CleanLooks,
-    coverage,
-    diverging,
-    over_unpainted,
-    round_up,
-)
+from lightpaint.report import answer_pictures, diagnosis_sentences
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
-from lightpaint.report.diagnosis_sentences import (
-    error_sentences,
-    spoken_errors,
-    spoken_hold,
-    spoken_shares,
-    uncertainty_sentence,
-)
 from lightpaint.report.measures import brightness, energy_shares, relative_errors, relative_residual
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
 from lightpaint.report.page.html import html
@@ -50,7 +27,7 @@ MIN_WIDTH = 320
 NEIGHBOURS = 2
 
 #: The colours that lamps may have, in few words.
-COLOR_MEANINGS: dict[Colors, str] = {
+COLOR_MEANINGS: dict[lighting.Colors, str] = {
     "free": "any colour",
     "gentle": "their own colour, unless the painting clearly asks for another",
     "white": "whites, from warm to cool",
@@ -69,11 +46,11 @@ SMALLEST_GAIN = 0.002
 
 def constraints_section(
     basis: Basis,
-    solution: Solution,
-    free: Solution | None,
+    solution: lighting.Solution,
+    free: lighting.Solution | None,
     *,
     transform: ViewTransform,
-    looks: CleanLooks | None = None,
+    looks: answer_pictures.CleanLooks | None = None,
 ) -> Markup:
     """Return the best answer without constraints, `free`, beside the answer, from the basis.
 
@@ -98,7 +75,9 @@ def constraints_section(
     )
 
 
-def _curve(solution: Solution, free: Solution) -> tuple[list[dict[str, Any]], int]:
+def _curve(
+    solution: lighting.Solution, free: lighting.Solution
+) -> tuple[list[dict[str, Any]], int]:
     """Return, with `sparse`, the errors by number of lights, and how many of them to show."""
     curve = solution.certificate.curve
     if not curve:
@@ -118,7 +97,7 @@ def _curve(solution: Solution, free: Solution) -> tuple[list[dict[str, Any]], in
     return [{"label": label, "missed": missed} for label, missed in entries], len(points) + 1
 
 
-def _neighbours(solution: Solution) -> list[tuple[Doubles, str, str]]:
+def _neighbours(solution: lighting.Solution) -> list[tuple[Doubles, str, str]]:
     """Return, with `sparse`, pictures with fewer and with more lights, as `_figures` takes them."""
     used_count, missed_with = _used_count(solution), dict(solution.certificate.curve)
     return [
@@ -132,7 +111,7 @@ def _figures(
     basis: Basis,
     pictures: list[tuple[Doubles, str, str]],
     transform: ViewTransform,
-    looks: CleanLooks | None,
+    looks: answer_pictures.CleanLooks | None,
 ) -> list[Markup]:
     """Return pictures of weights (n, 3), each with its name and a caption."""
     factor = max(1, min(basis.size[1] // MIN_WIDTH, *basis.size))
@@ -146,7 +125,7 @@ def _figures(
     return figures
 
 
-def _used_count(solution: Solution) -> int:
+def _used_count(solution: lighting.Solution) -> int:
     """Return the number of lights of the curve that the answer has."""
     most = solution.problem.constraints.sparse or 0
     return max((count for count, _ in solution.certificate.curve if count <= most), default=0)
@@ -156,7 +135,7 @@ def _lights(count: int) -> str:
     return f"{count} light{'' if count == 1 else 's'}"
 
 
-def spoken_choice(choice: ColorChoice, chosen: ColorChoice) -> str:
+def spoken_choice(choice: lighting.ColorChoice, chosen: lighting.ColorChoice) -> str:
     """Return `free: ΔE 2.1 instead of 2.6, but pendant turns green`."""
     gains = chosen.delta_e - choice.delta_e
     text = f"ΔE {choice.delta_e:.1f} instead of {chosen.delta_e:.1f}"
@@ -167,7 +146,7 @@ def spoken_choice(choice: ColorChoice, chosen: ColorChoice) -> str:
     return f"{choice.colors}: {text}{joint + turns if turns else ''}"
 
 
-def spoken_turn(choice: ColorChoice) -> str:
+def spoken_turn(choice: lighting.ColorChoice) -> str:
     """Return `pendant turns green`; "" if no light visibly changes its hue."""
     if not choice.light:
         return ""
@@ -184,7 +163,7 @@ def spoken_turn(choice: ColorChoice) -> str:
     return f"{some_names([choice.light])} turns {word}"
 
 
-def closer_choice(choices: Choices) -> str:
+def closer_choice(choices: lighting.Choices) -> str:
     """Return `free: ΔE 2.1 …`, if another choice is notably closer; else ""."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     best = min(choices, key=lambda choice: choice.delta_e, default=None)
@@ -193,7 +172,7 @@ def closer_choice(choices: Choices) -> str:
     return spoken_choice(best, chosen)
 
 
-def colors_section(choices: Choices) -> Markup:
+def colors_section(choices: lighting.Choices) -> Markup:
     """Return the section on the choices; empty if there are none."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     if chosen is None:
@@ -211,7 +190,7 @@ def colors_section(choices: Choices) -> Markup:
     return html("colors", choices=shown)
 
 
-def _change_cell(choice: ColorChoice, chosen: ColorChoice) -> str:
+def _change_cell(choice: lighting.ColorChoice, chosen: lighting.ColorChoice) -> str:
     """Return the text of a cell of the table."""
     if choice is chosen:
         return ""
@@ -220,12 +199,17 @@ def _change_cell(choice: ColorChoice, chosen: ColorChoice) -> str:
     return "; ".join(filter(None, (closeness, spoken_turn(choice))))
 
 
-def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> Markup:
+def sure_section(
+    basis: Basis, solution: lighting.Solution, uncertainty: lighting.Uncertainty | None
+) -> Markup:
     """Return the section on uncertainty: a sentence, and the lights with notable errors."""
     if uncertainty is None:
         return Markup("")
     shares = energy_shares(basis, solution.lighting)
-    errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
+    errors, spoken = (
+        relative_errors(uncertainty),
+        diagnosis_sentences.spoken_errors(uncertainty, len(shares)),
+    )
     solved, low, high = brightness(uncertainty)
     effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * shares
     # Lights that are off and may be on come last, by their possible brightness.
@@ -243,7 +227,7 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     ]
     return html(
         "uncertainty",
-        sentence=uncertainty_sentence(basis, solution, uncertainty),
+        sentence=diagnosis_sentences.uncertainty_sentence(basis, solution, uncertainty),
         excess=uncertainty.relative_excess,
         steps=_steps(solution),
         lights=lights,
@@ -251,7 +235,7 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     )
 
 
-def _steps(solution: Solution) -> str:
+def _steps(solution: lighting.Solution) -> str:
     """Return the measures against noise, besides sampling, in words."""
     steps = []
     if solution.problem.noise_removed:
@@ -277,12 +261,12 @@ OTHER_PLACES = (
 
 
 def missed_section(
-    solution: Solution,
-    diagnosis: Diagnosis | None,
+    solution: lighting.Solution,
+    diagnosis: lighting.Diagnosis | None,
     current: Floats,
     *,
     transform: ViewTransform,
-    appearance: Appearance | None = None,
+    appearance: lighting.Appearance | None = None,
     can_place: bool = False,
 ) -> Markup:
     """Return the section on the error: sentences, shares, maps and bounds.
@@ -291,7 +275,7 @@ def missed_section(
     """
     if diagnosis is None:
         return Markup("")
-    sentences = list(error_sentences(diagnosis, appearance))
+    sentences = list(diagnosis_sentences.error_sentences(diagnosis, appearance))
     if can_place and appearance is not None and appearance.is_out_of_reach:
         sentences.append(OTHER_PLACES)
     return html(
@@ -305,7 +289,7 @@ def missed_section(
     )
 
 
-def _shares(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _shares(diagnosis: lighting.Diagnosis) -> list[dict[str, Any]]:
     """Return the parts of the error, with their shares in words and as numbers."""
     d = diagnosis
     by_what = "by zero or by the constraints" if d.is_constrained else "needs light below zero"
@@ -319,7 +303,7 @@ def _shares(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         ("painting_noise", "noise of the painting", d.painting_noise),
     ]
     parts += [part for part in optional_parts if part[2] > 0]
-    percents = spoken_shares(d)
+    percents = diagnosis_sentences.spoken_shares(d)
     shares: list[dict[str, Any]] = []
     for key, label, energy in parts:
         share = d.share(energy)
@@ -334,7 +318,11 @@ def _shares(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _maps(
-    solution: Solution, diagnosis: Diagnosis, current: Floats, *, transform: ViewTransform
+    solution: lighting.Solution,
+    diagnosis: lighting.Diagnosis,
+    current: Floats,
+    *,
+    transform: ViewTransform,
 ) -> list[Markup]:
     parts = [
         (
@@ -350,13 +338,13 @@ def _maps(
         ),
     ]
     limit = maps_limit(solution, diagnosis, transform=transform)
-    share, figures = coverage(solution.importance), []
+    share, figures = answer_pictures.coverage(solution.importance), []
     for name, image, caption in parts:
         if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:
             continue  # an empty picture
         # As in the residual's map: predicted − painted, so that bright is too bright.
-        shown = over_unpainted(
-            lambda x: diverging(-luminance(x) / limit),
+        shown = answer_pictures.over_unpainted(
+            lambda x: answer_pictures.diverging(-luminance(x) / limit),
             image,
             share,
             current,
@@ -375,9 +363,11 @@ def _maps(
     return figures
 
 
-def _ignored_map(diagnosis: Diagnosis, limit: float) -> Markup:
+def _ignored_map(diagnosis: lighting.Diagnosis, limit: float) -> Markup:
     """Return the figure of the error that does not count. limit: of the scale."""
-    colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
+    colours = by_bands(
+        lambda x: to_8_bit(answer_pictures.diverging(-x / limit)), diagnosis.ignored_map
+    )
     return figure(
         PagePicture("Not counted", "False-colour map of what does not count.", colours),
         "The difference where the importance is small.",
@@ -385,15 +375,19 @@ def _ignored_map(diagnosis: Diagnosis, limit: float) -> Markup:
     )
 
 
-def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:
+def maps_limit(
+    solution: lighting.Solution, diagnosis: lighting.Diagnosis, *, transform: ViewTransform
+) -> float:
     """Return the end of the scale of all maps of the error."""
     counted = solution.importance > 0
     maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
     sizes = np.concatenate([np.abs(by_bands(luminance, image)[counted]) for image in maps])
-    return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
+    return answer_pictures.round_up(
+        max(float(np.percentile(sizes, 99)), answer_pictures.FINEST_SCALE * 2.0**-transform.stops)
+    )
 
 
-def _bounds(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _bounds(diagnosis: lighting.Diagnosis) -> list[dict[str, Any]]:
     """Return the rows of the limits whose removal would gain most."""
     units = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
     return [
@@ -409,12 +403,12 @@ def _bounds(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def _bound_words(bound: Bound) -> str:
+def _bound_words(bound: lighting.Bound) -> str:
     """Return the bound in words; zero is called zero, unlike a wish for off."""
-    channels = spoken_hold(bound)
+    channels = diagnosis_sentences.spoken_hold(bound)
     return channels.replace("off", "zero") if bound.kind == "zero" else channels
 
 
-def _slope(bound: Bound) -> str:
+def _slope(bound: lighting.Bound) -> str:
     numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
     return ", ".join(numbers)

@@ -17,6 +17,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from markupsafe import Markup
 
+from lightpaint import colour
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis import (
     Basis,
@@ -26,15 +27,6 @@ from lightpaint.basis import (
     denoise_plane,
     light_images,
     make_once,
-)
-from lightpaint.colour import (
-    ViewTransform,
-    curve_of,
-    kelvin_to_rgb,
-    lattice_of,
-    luminance,
-    photometry,
-    to_8_bit,
 )
 from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
 from lightpaint.lighting import ALL_REACHED, Lighting, lighting_fields
@@ -77,7 +69,7 @@ class JointLights:
         """
         if self.image is None:
             return 1.0
-        now, new = (float(luminance(self.image.mean(x))) for x in (current, weights))
+        now, new = (float(colour.luminance(self.image.mean(x))) for x in (current, weights))
         return new / now if now > 0 and new > 0 else 1.0
 
     def mixes(self, lighting: Lighting, basis: Basis) -> list[Doubles]:
@@ -114,7 +106,7 @@ def mixer_html(
     lighting: Lighting,
     painting: Floats | None = None,
     *,
-    transform: ViewTransform | None = None,
+    transform: colour.ViewTransform | None = None,
     is_clean: bool = False,
     scene: str | None = None,
     max_pixels: int = MAX_PIXELS,
@@ -134,7 +126,7 @@ def mixer_html(
     options: PlaneOptions = {"is_clean": is_clean, "max_pixels": max_pixels}
     size, planes = _shown_planes(basis, lighting, shown, joint, **options)
     factor = page_reduction(basis, len(planes), max_pixels=max_pixels)
-    transform = transform or ViewTransform()
+    transform = transform or colour.ViewTransform()
     data = {
         "size": size,
         "planes": planes,
@@ -241,13 +233,13 @@ def light_data(light: BasisLight) -> dict[str, Any]:
 
 
 def _kelvin(emission: Any, unit: str) -> float | None:
-    return photometry(emission, unit=unit).kelvin
+    return colour.photometry(emission, unit=unit).kelvin
 
 
 def kelvin_colors() -> dict[str, Any]:
     """Return colours of luminance 1 by temperature, evenly in mireds, for the sliders."""
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
-    colors = [[round(float(x), 5) for x in kelvin_to_rgb(float(1e6 / m))] for m in mireds]
+    colors = [[round(float(x), 5) for x in colour.kelvin_to_rgb(float(1e6 / m))] for m in mireds]
     return {"coolest": COOLEST, "warmest": WARMEST, "colors": colors}
 
 
@@ -258,15 +250,18 @@ def packed_gels() -> str:
     return "data:;base64," + base64.b64encode(zlib.compress(rows.encode(), 9)).decode("ascii")
 
 
-def transform_data(transform: ViewTransform) -> dict[str, Any]:
+def transform_data(transform: colour.ViewTransform) -> dict[str, Any]:
     """Return a transform for the page: sRGB by name, a curve, or a lattice if channels mix."""
     data: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
-    transform_without_exposure = ViewTransform(transform.name)
+    transform_without_exposure = colour.ViewTransform(transform.name)
     curve, lattice = None, None
     if transform.name != "srgb" and transform.is_per_channel:
-        curve = [round(float(x), 5) for x in curve_of(transform_without_exposure, CURVE, LOW, HIGH)]
+        curve = [
+            round(float(x), 5)
+            for x in colour.curve_of(transform_without_exposure, CURVE, LOW, HIGH)
+        ]
     elif transform.name != "srgb":
-        table = lattice_of(transform_without_exposure, SIDE, LOW, HIGH).reshape(
+        table = colour.lattice_of(transform_without_exposure, SIDE, LOW, HIGH).reshape(
             SIDE * SIDE, SIDE, 3
         )
         lattice = _plane_data(pack_picture(table, dropped=1))
@@ -275,7 +270,7 @@ def transform_data(transform: ViewTransform) -> dict[str, Any]:
 
 def _painting(painting: Floats, factor: int) -> str:
     small = block_mean(np.asarray(painting, np.float32), factor)
-    return data_uri(to_8_bit(np.clip(small, 0, 1)))
+    return data_uri(colour.to_8_bit(np.clip(small, 0, 1)))
 
 
 def plane_data(picture: Floats) -> dict[str, Any]:

@@ -17,43 +17,21 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from lightpaint import lighting
 from lightpaint.arrays import Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, covered, in_turns
-from lightpaint.lighting import (
-    Appearance,
-    PlanesAnswer,
-    Software,
-    Solution,
-    ignored_paint,
-    spoken_share,
-    version,
-)
 from lightpaint.photometry import false_colours, plane_title
 from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
-from lightpaint.report.answer_pictures import (
-    CleanLooks,
-    Residual,
-    brighter_than_white,
-    report_transform,
-    target_picture,
-)
+from lightpaint.report import answer_pictures, measures, planes_text
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.diagnosis_sentences import (
     fit_sentence,
     is_unnamed,
     partly_reached,
     wish_name,
-)
-from lightpaint.report.measures import (
-    ReportedAnswer,
-    count_at_least_pixels,
-    error_in_codes,
-    linear_residual,
-    noise_residual,
-    relative_residual,
 )
 from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
 from lightpaint.report.page.html import facts, html, name_list
@@ -70,14 +48,6 @@ from lightpaint.report.page.limit_sections import (
 )
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
-from lightpaint.report.planes_text import (
-    GLARE_HEADINGS,
-    HEADINGS,
-    glare_by_title,
-    glare_rows,
-    plane_rows,
-    planes_sentences,
-)
 from lightpaint.report.verdict_sentences import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target import Target
@@ -85,7 +55,10 @@ from lightpaint.version import __version__
 
 
 def report_page(
-    answer: ReportedAnswer, *, looks: CleanLooks | None = None, missed: Residual | None = None
+    answer: measures.ReportedAnswer,
+    *,
+    looks: answer_pictures.CleanLooks | None = None,
+    missed: answer_pictures.Residual | None = None,
 ) -> str:
     """Return the page as HTML text.
 
@@ -98,9 +71,11 @@ def report_page(
     answer = replace(answer, target=answer.target.fitted_to(basis.size, resize=False))
     verification = answer.verification
     verified = None if verification is None else verification.verified.image
-    raw = CleanLooks.raw(basis, predicted.image, verified)
+    raw = answer_pictures.CleanLooks.raw(basis, predicted.image, verified)
     looks = looks or raw
-    transform = looks.encoder(report_transform(answer.target, basis, predicted.image))
+    transform = looks.encoder(
+        answer_pictures.report_transform(answer.target, basis, predicted.image)
+    )
     # Most of the time goes into pictures, which are independent of each other.
     makers: dict[str, Callable[[], Markup]] = {
         "mixer": partial(_mixer, answer, looks, transform=transform),
@@ -165,13 +140,13 @@ def report_page(
     return str(page)
 
 
-def _first_view(solution: Solution) -> str:
+def _first_view(solution: lighting.Solution) -> str:
     """Return the sensor of the first of several views; "" if there is only one."""
     whole = solution.whole
     return "" if whole is None else whole.problem.views.bases[0].origin.sensor
 
 
-def _texts(answer: ReportedAnswer) -> dict[str, Any]:
+def _texts(answer: measures.ReportedAnswer) -> dict[str, Any]:
     """Return the parts of the page without a picture, by their names in it."""
     basis, target, solution = answer.basis, answer.target, answer.solution
     predicted, verification = answer.predicted, answer.verification
@@ -202,7 +177,11 @@ def prepare_page(basis: Basis) -> None:
 
 
 def _wipe(
-    answer: ReportedAnswer, looks: CleanLooks, raw: CleanLooks, *, transform: ViewTransform
+    answer: measures.ReportedAnswer,
+    looks: answer_pictures.CleanLooks,
+    raw: answer_pictures.CleanLooks,
+    *,
+    transform: ViewTransform,
 ) -> Markup:
     """Return the pictures to compare, in the order of the page's lists."""
     target, verification = answer.target, answer.verification
@@ -217,7 +196,9 @@ def _wipe(
         PagePicture(
             "painting",
             f"What was painted. The rest is {'the current look' if target.over_look else 'grey'}.",
-            target_picture(target, looks.current, transform=transform, finish=to_8_bit),
+            answer_pictures.target_picture(
+                target, looks.current, transform=transform, finish=to_8_bit
+            ),
         ),
         picture(
             "answer",
@@ -233,13 +214,15 @@ def _wipe(
     return wipe(pictures)
 
 
-def _mixer(answer: ReportedAnswer, looks: CleanLooks, *, transform: ViewTransform) -> Markup:
+def _mixer(
+    answer: measures.ReportedAnswer, looks: answer_pictures.CleanLooks, *, transform: ViewTransform
+) -> Markup:
     """Return the mixer of the lights."""
     basis, scene = answer.basis, answer.basis.origin.scene
     return mixer_html(
         basis,
         answer.solution.lighting,
-        target_picture(answer.target, looks.current, transform=transform),
+        answer_pictures.target_picture(answer.target, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
         scene=shlex.quote(_absolute_path(scene)) if scene.endswith(".xml") else None,
@@ -256,7 +239,7 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     exposure_text = (
         f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
     )
-    clipped = brighter_than_white(predicted, transform)
+    clipped = answer_pictures.brighter_than_white(predicted, transform)
     text = f"All at {exposure_text}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
@@ -265,7 +248,7 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     return text
 
 
-def planes_section(answer: PlanesAnswer | None) -> Markup:
+def planes_section(answer: lighting.PlanesAnswer | None) -> Markup:
     """Return the table of planes, sentences about it, and false colours; nothing without planes."""
     if answer is None:
         return Markup("")
@@ -275,17 +258,20 @@ def planes_section(answer: PlanesAnswer | None) -> Markup:
         tables=[
             (headings, rows)
             for headings, rows in (
-                (HEADINGS, [*plane_rows(answer)]),
-                (GLARE_HEADINGS, [*glare_rows(glare_by_title(answer))]),
+                (planes_text.HEADINGS, [*planes_text.plane_rows(answer)]),
+                (
+                    planes_text.GLARE_HEADINGS,
+                    [*planes_text.glare_rows(planes_text.glare_by_title(answer))],
+                ),
             )
             if rows
         ],
-        sentences=planes_sentences(answer),
+        sentences=planes_text.planes_sentences(answer),
         pictures=_pictures(answer),
     )
 
 
-def _pictures(answer: PlanesAnswer) -> list[dict[str, Any]]:
+def _pictures(answer: lighting.PlanesAnswer) -> list[dict[str, Any]]:
     """Return false colours of the illuminance on each plane."""
     illuminance, pictures = answer.wished.illuminance, []
     for case, weights in answer.weights_by_case.items():
@@ -299,7 +285,7 @@ def _pictures(answer: PlanesAnswer) -> list[dict[str, Any]]:
     return pictures
 
 
-def wishes_section(appearance: Appearance | None) -> Markup:
+def wishes_section(appearance: lighting.Appearance | None) -> Markup:
     """Return the section on how much of each wish came; "" if none asks for anything visible.
 
     The verdict says it of an only one without a name.
@@ -308,10 +294,10 @@ def wishes_section(appearance: Appearance | None) -> Markup:
     entries = [entry for entry in deliveries if entry.least is not None]
     if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
         return Markup("")
-    return html("wishes", entries=entries, wish_name=wish_name, spoken_share=spoken_share)
+    return html("wishes", entries=entries, wish_name=wish_name, spoken_share=lighting.spoken_share)
 
 
-def fit_table(solution: Solution) -> Markup:
+def fit_table(solution: lighting.Solution) -> Markup:
     """Return rows of the objective with its standard error, optimality and sweeps, per channel and
     in all.
     """
@@ -337,7 +323,7 @@ def fit_table(solution: Solution) -> Markup:
         }
         for name, objective, error, kkt, sweeps in columns
     ]
-    residual = relative_residual(solution)
+    residual = measures.relative_residual(solution)
     # One path carries all channels, so that their errors go together.
     error = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
     total = {
@@ -388,7 +374,7 @@ def _light_tests(v: Verification) -> list[tuple[str, str]]:
 def render_table(
     basis: Basis,
     target: Target,
-    solution: Solution,
+    solution: lighting.Solution,
     predicted: Estimate,
     verification: Verification | None,
 ) -> Markup:
@@ -398,7 +384,7 @@ def render_table(
     convergence_text = f"no: stopped after {max(q.sweeps)} sweeps"
     emitter_pixels = int(basis.emitters_seen.sum())
     ignored_pixels = int(
-        ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum()
+        lighting.ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum()
     )
     adjusted = int((~basis.is_fixed).sum())
     entries: list[tuple[str, str]] = [
@@ -410,7 +396,10 @@ def render_table(
         ("Observer", origin.observer),
         ("Emitters seen directly", f"in {emitter_pixels} pixels{_seen_note(ignored_pixels)}"),
     ]
-    missed, noise = relative_residual(solution), noise_residual(solution, predicted)
+    missed, noise = (
+        measures.relative_residual(solution),
+        measures.noise_residual(solution, predicted),
+    )
     entries.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
     entries += _display_facts(solution, predicted)
     for light in basis.lights:
@@ -425,7 +414,7 @@ def render_table(
     return facts([(label, value) for label, value in entries if value])
 
 
-def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+def _display_facts(solution: lighting.Solution, predicted: Estimate) -> list[tuple[str, str]]:
     """Return facts on the comparison with the painting, if it was not in plain linear light."""
     if solution.problem.is_linear or solution.reweighting is None:
         return []
@@ -436,16 +425,15 @@ def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, s
             ("Fitted in display space", f"as {q.display} shows it"),
             (
                 "Missed on the display",
-                f"{error_in_codes(solution):.1f} of 255 codes, {relative_residual(solution):.3g} "
-                f"of "
-                "the painting (RMS)",
+                f"{measures.error_in_codes(solution):.1f} of 255 codes, "
+                f"{measures.relative_residual(solution):.3g} of the painting (RMS)",
             ),
             (
                 "Missed in linear light",
-                f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
+                f"{measures.linear_residual(solution, predicted):.3g} of the painting (RMS)",
             ),
         ]
-    if (at_least := count_at_least_pixels(solution, predicted.image)) is not None:
+    if (at_least := measures.count_at_least_pixels(solution, predicted.image)) is not None:
         pixels, brighter = at_least
         text = f"{pixels} pixels, {brighter} of which are brighter now"
         entries.append(("Painted as at least so bright", text))
@@ -473,14 +461,14 @@ def versions(basis: Basis) -> str:
     parts += [
         f"{name} {installed}"
         for name in ("mitsuba", "drjit", "numpy")
-        if (installed := version(name))
+        if (installed := lighting.version(name))
     ]
-    software = Software.installed()
+    software = lighting.Software.installed()
     parts.append(f"{software.blas} {software.kernel}".strip())
     return " · ".join([*parts, f"Python {platform.python_version()}"])
 
 
-def _lights_off(solution: Solution) -> int:
+def _lights_off(solution: lighting.Solution) -> int:
     return sum(not any(light.emission) for light in solution.lighting.lights)
 
 

@@ -12,13 +12,7 @@ from lightpaint.arrays import RGB, Doubles, Floats, Indices, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.image_domains import (
-    DOMAINS,
-    GridSize,
-    ImageDomain,
-    Sky,
-    domain_of,
-)
+from lightpaint.scene.lights.texels import image_domains
 from lightpaint.scene.lights.texels.texel import RATIO, Texel, TexelLayout, node_name
 from lightpaint.scene.plane_identity import EmitterDigest
 from lightpaint.scene.properties.emission import (
@@ -48,7 +42,7 @@ MAX_PLACES, MAX_COMPARISONS = 512, 2**23
 def with_split(
     facts: Mapping[str, Any],
     parsed: ParsedScene,
-    split: Mapping[str, GridSize | TexelLayout],
+    split: Mapping[str, image_domains.GridSize | TexelLayout],
     symmetric: Collection[str] = (),
 ) -> dict[str, Any]:
     """Return the facts of `inspect_scene` with some emitters split into texels.
@@ -74,17 +68,19 @@ def with_split(
 
 
 def images_to_split(
-    sizes: Mapping[str, GridSize | TexelLayout], emitters: Sequence[Emitter], scene: str
-) -> dict[str, GridSize | TexelLayout]:
+    sizes: Mapping[str, image_domains.GridSize | TexelLayout],
+    emitters: Sequence[Emitter],
+    scene: str,
+) -> dict[str, image_domains.GridSize | TexelLayout]:
     """Return columns and rows, or layouts, by name of an emitter, of names and patterns of lights.
 
     A pattern stands for the lights of its name that can be split; the name of one comes before
     patterns that match it. Raises SceneError for a pattern that matches none.
     """
     names = [x.name for x in emitters]
-    possible = [x.name for x in emitters if x.plugin in DOMAINS]
+    possible = [x.name for x in emitters if x.plugin in image_domains.DOMAINS]
     named = {name: size for name, size in sizes.items() if name in names or not _is_pattern(name)}
-    matched: dict[str, GridSize | TexelLayout] = {}
+    matched: dict[str, image_domains.GridSize | TexelLayout] = {}
     for pattern, size in sizes.items():
         if pattern in named:
             continue
@@ -108,10 +104,12 @@ def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
     """Return the index of an emitter that can be split. Raises SceneError without one."""
     names = [x.name for x in emitters]
     if name not in names:
-        raise _no_light_to_split(name, [x.name for x in emitters if x.plugin in DOMAINS], scene)
+        raise _no_light_to_split(
+            name, [x.name for x in emitters if x.plugin in image_domains.DOMAINS], scene
+        )
     emitter = emitters[names.index(name)]
-    if emitter.plugin not in DOMAINS:
-        *others, last = DOMAINS
+    if emitter.plugin not in image_domains.DOMAINS:
+        *others, last = image_domains.DOMAINS
         raise SceneError(
             f"split: light {name!r} is of the kind {emitter.plugin}: only {', '.join(others)} and "
             f"{last} lights can be split into texels"
@@ -124,7 +122,7 @@ def _texels(
 ) -> list[Emitter]:
     """Return the texels of an emitter as emitters, row by row, at their current emission."""
     shape = parsed.shape_plugin(emitter.node)
-    domain = domain_of(emitter.plugin, shape)
+    domain = image_domains.domain_of(emitter.plugin, shape)
     if emitter.obstacle:
         raise SceneError(f"light {emitter.name!r} {emitter.obstacle}, so it cannot be split")
     assert emitter.kind is not None
@@ -138,7 +136,7 @@ def _texels(
             f"light {emitter.name!r} {reason}, so it cannot be split: give it a rectangle, or a "
             "mesh with texture coordinates (uv) for one flat image"
         )
-    if layout.splits and not isinstance(domain, Sky):
+    if layout.splits and not isinstance(domain, image_domains.Sky):
         raise SceneError(f"light {emitter.name!r} is not a sky: only its texels can be split again")
     radiances = _current_radiances(emitter, layout, domain, parsed)
     if is_symmetric:
@@ -164,7 +162,7 @@ def _texels(
 
 
 def _current_radiances(
-    emitter: Emitter, layout: TexelLayout, domain: ImageDomain, parsed: ParsedScene
+    emitter: Emitter, layout: TexelLayout, domain: image_domains.ImageDomain, parsed: ParsedScene
 ) -> Doubles:
     """Return what the texels of an emitter show now, (nodes, 3)."""
     assert emitter.kind is not None
@@ -201,7 +199,7 @@ def _digest(digest: EmitterDigest | None, texel: Texel) -> EmitterDigest | None:
     return digest and EmitterDigest(f"{digest.unit} {place}", f"{digest.as_is} {place}")
 
 
-def kind_of(domain: ImageDomain) -> EmissionKind:
+def kind_of(domain: image_domains.ImageDomain) -> EmissionKind:
     """Return how the texels of an image are scaled."""
     return EmissionKind(Scaling.COLOUR, domain.parameter, domain.unit)
 
@@ -265,8 +263,8 @@ def current_image(
     node: int,
     kind: EmissionKind,
     emission: RGB,
-    domain: ImageDomain,
-    size: GridSize,
+    domain: image_domains.ImageDomain,
+    size: image_domains.GridSize,
     parsed: ParsedScene,
 ) -> Doubles:
     """Return the emission that each texel of an emitter has now, (rows, columns, 3), with the same
@@ -304,7 +302,7 @@ def current_image(
 
 
 def shown_image(
-    image: Floats, size: GridSize, to_uv: Doubles, *, filter_type: str, wrap_mode: str
+    image: Floats, size: image_domains.GridSize, to_uv: Doubles, *, filter_type: str, wrap_mode: str
 ) -> Doubles:
     """Return what a bitmap shows on texture coordinates from 0 to 1, (h, w, 3).
 
