@@ -33,7 +33,7 @@ from lightpaint.basis.render.tracer import wavelengths
 from lightpaint.colour.color import ciede2000, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.spectra.spectrum import EYE, WAVELENGTHS, rgb_of_powers, spectrum_of
+from lightpaint.colour.spectrum import EYE, WAVELENGTHS, rgb_of_powers, spectrum_of
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.combination import combine

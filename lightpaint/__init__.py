@@ -87,7 +87,7 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job_run import run as run
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
     from lightpaint.pipeline.relit_renders import relight_frames as relight_frames
-    from lightpaint.pipeline.results.look import Look as Look
+    from lightpaint.pipeline.look import Look as Look
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.freedom import Freedom as Freedom

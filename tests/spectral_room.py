@@ -7,7 +7,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import basis_lights
-from lightpaint.colour.spectra.spectrum import EYE, Observer
+from lightpaint.colour.spectrum import EYE, Observer
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import lamps_by_name

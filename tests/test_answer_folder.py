@@ -8,7 +8,7 @@ from renderer import write_room
 
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.results.result_folder import (
+from lightpaint.pipeline.result_folder import (
     ResultFolder,
     answer_files,
     new_answer,

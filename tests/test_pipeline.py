@@ -10,8 +10,8 @@ import pytest
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.pipeline.results import look
-from lightpaint.pipeline.results.look import VIEW_KEY, verify_result
+from lightpaint.pipeline import look
+from lightpaint.pipeline.look import VIEW_KEY, verify_result
 
 IMAGE = np.ones((2, 3, 3), np.float32)
 

@@ -18,7 +18,7 @@ from lightpaint.errors import OutputError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.job.sources import BasisFile
-from lightpaint.pipeline.results.result_folder import RECORD
+from lightpaint.pipeline.result_folder import RECORD
 
 SOLVE = ("solve", "a.basis.exr")
 
@@ -358,7 +358,7 @@ def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(
 
 
 def test_views_that_are_not_painted_any_more_go(work_folder: Path, make_basis: Any) -> None:
-    from lightpaint.pipeline.results.result_folder import ResultFolder
+    from lightpaint.pipeline.result_folder import ResultFolder
 
     result_folder = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
     one = replace(result_folder, files=(Path("out/a/x"),), answers=("a",))

@@ -12,13 +12,13 @@ from spectral_room import DRIVES, LEVELS, paint_spectral_room, write_spectral_ro
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
-from lightpaint.colour.spectra.spectrum import EYE, read_observer
+from lightpaint.colour.spectrum import EYE, read_observer
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.pipeline.job.sources import spectral_scene
-from lightpaint.pipeline.results.look import verify_result
+from lightpaint.pipeline.look import verify_result
 from lightpaint.relit.formats import spectra_csv
 from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.scene_reader import load_scene

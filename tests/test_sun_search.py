@@ -18,8 +18,8 @@ from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.values import parse_color
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job_bases import Certainty
+from lightpaint.pipeline.look import Look
 from lightpaint.pipeline.one_call import paint_with_light
-from lightpaint.pipeline.results.look import Look
 from lightpaint.progress import Listener
 from lightpaint.scene.lights.texels.texel import coarse_name
 from lightpaint.scene.properties.emission import read_emitted_image

@@ -151,7 +151,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
     "lighting.analysis.appearance.display_difference": ("UnpaintedChange",),
     "lighting.analysis.diagnosis": ("Place",),
-    "colour.spectra.spectrum": ("Observer",),
+    "colour.spectrum": ("Observer",),
     "lighting.analysis.rendered_colors": ("SurfaceColor",),
     "placement.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),

@@ -19,7 +19,7 @@ from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import FORMAT
 from lightpaint.paint.protocol import Event, Request
-from lightpaint.pipeline.results.result_folder import _Record
+from lightpaint.pipeline.result_folder import _Record
 from lightpaint.placement.light_changes import PlacementRecord
 from lightpaint.relit.export import fixtures
 

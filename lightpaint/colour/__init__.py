@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from lightpaint.colour.color_ranges import (
         DIRECTIONS, ROUND_OFF, ColorHull, WhiteRange, chromaticity, reach_of, sides_of, white_range,
     )
+    from lightpaint.colour.color_rendering import (
+        ColorRendering, adapted_color, color_rendering, fidelity, white_of,
+    )
     from lightpaint.colour.display.exposure import choose_exposure
     from lightpaint.colour.display.tone_curves import BUILT_IN
     from lightpaint.colour.display.view_transform import (
@@ -36,10 +39,7 @@ if TYPE_CHECKING:
         encode_display, from_rec709, gamma_profile, is_rec709, primaries_in, read_icc, rgb_to_xyz,
         srgb_profile, to_8_bit, to_rec709,
     )
-    from lightpaint.colour.spectra.color_rendering import (
-        ColorRendering, adapted_color, color_rendering, fidelity, white_of,
-    )
-    from lightpaint.colour.spectra.spectrum import (
+    from lightpaint.colour.spectrum import (
         EYE, FEWEST_POINTS, STEP, WAVELENGTHS, Observer, Spectrum, daylight, file_of_spectrum,
         measured_points, named_spectrum, read_observer, rgb_of_powers, spectrum_of, xyz_of_powers,
     )

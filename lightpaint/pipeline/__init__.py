@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     )
     from lightpaint.pipeline.job_bases import Certainty, needed_counts, obtain
     from lightpaint.pipeline.job_run import run
+    from lightpaint.pipeline.look import (
+        Look, hung_of, result_folders, verify_result, view_names, write_predicted,
+    )
     from lightpaint.pipeline.one_call import paint_with_light
     from lightpaint.pipeline.placed_lights import find_places, moved_basis, say_changes
     from lightpaint.pipeline.relit_renders import (
         DENOISED, frames_to_write, relight_frames, relight_look, relit_folder, render_final,
         write_final_exr, write_final_png,
     )
-    from lightpaint.pipeline.results.look import (
-        Look, hung_of, result_folders, verify_result, view_names, write_predicted,
-    )
-    from lightpaint.pipeline.results.result_folder import (
+    from lightpaint.pipeline.result_folder import (
         LIGHTING, PLANES_FOLDER, RECORD, RELIT, ResultFolder, answer_files, files_of_planes,
         is_as_written, new_answer, write_answer, write_planes,
     )

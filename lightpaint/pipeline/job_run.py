@@ -28,12 +28,11 @@ from lightpaint.lighting import (
     tie_frames,
     with_findings,
 )
-from lightpaint.pipeline import job_bases
+from lightpaint.pipeline import job_bases, result_folder
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.solve_job import Job, PaintedView
+from lightpaint.pipeline.look import Look, write_predicted, write_report
 from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
-from lightpaint.pipeline.results import result_folder
-from lightpaint.pipeline.results.look import Look, write_predicted, write_report
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     answer_on_planes,

@@ -16,7 +16,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
 from lightpaint.pipeline.job_run import run
-from lightpaint.pipeline.results.look import Look
+from lightpaint.pipeline.look import Look
 from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene import Scene

@@ -26,7 +26,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import content
 from lightpaint.pipeline.job_bases import obtain, problem_of, view_listener, without_noise
-from lightpaint.pipeline.results.look import all_changes, spoken_change
+from lightpaint.pipeline.look import all_changes, spoken_change
 from lightpaint.placement import (
     Freedom,
     Move,

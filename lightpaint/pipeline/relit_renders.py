@@ -23,10 +23,10 @@ from lightpaint.files import check_files
 from lightpaint.images import formats
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Lighting, read_lighting
+from lightpaint.pipeline import result_folder
 from lightpaint.pipeline.job.job_checks import remarks_of_pictures
 from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
-from lightpaint.pipeline.results import result_folder
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.relit import relight, relit_part
 from lightpaint.scene import Scene, Stream, render, render_features, with_width

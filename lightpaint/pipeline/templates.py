@@ -29,7 +29,7 @@ from lightpaint.lighting import read_lighting
 from lightpaint.pipeline.job.job_checks import remarks_of_pictures
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.results.result_folder import LIGHTING
+from lightpaint.pipeline.result_folder import LIGHTING
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.report import HungLight, light_sheet
 from lightpaint.scene import Scene, Stream, render, render_features, render_surfaces

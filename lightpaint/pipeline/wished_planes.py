@@ -46,7 +46,7 @@ from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.solve_job import Job
-from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
+from lightpaint.pipeline.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.scene import Scene
 

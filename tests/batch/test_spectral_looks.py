@@ -18,7 +18,7 @@ from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.spectra.spectrum import rgb_of_powers, spectrum_of
+from lightpaint.colour.spectrum import rgb_of_powers, spectrum_of
 from lightpaint.errors import BatchError
 from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting

@@ -24,7 +24,7 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
-from lightpaint.pipeline.results.look import verify_result
+from lightpaint.pipeline.look import verify_result
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painted_target import Target

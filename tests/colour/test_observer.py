@@ -7,7 +7,7 @@ import pytest
 
 from lightpaint.colour.color import ciede2000, lab
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import (
+from lightpaint.colour.spectrum import (
     EYE,
     WAVELENGTHS,
     named_spectrum,

@@ -23,7 +23,7 @@ from rig_files import (
 
 from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.luminous_flux import spot_flux
-from lightpaint.colour.spectra.spectrum import read_spectrum
+from lightpaint.colour.spectrum import read_spectrum
 from lightpaint.dmx import rig_scene
 from lightpaint.dmx.mvr import PlacedModel, read_rig, read_show
 from lightpaint.dmx.rig_scene import (

@@ -8,7 +8,7 @@ import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, rgb_of_powers
+from lightpaint.colour.spectrum import WAVELENGTHS, black_body, rgb_of_powers
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting

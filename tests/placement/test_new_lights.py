@@ -11,7 +11,7 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.results.look import spoken_change
+from lightpaint.pipeline.look import spoken_change
 from lightpaint.placement.free_space import seen_by_camera
 from lightpaint.placement.new_lights import Mirror
 from lightpaint.scene.lights.new_emitter import NewEmitter

@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.results.look import spoken_move
+from lightpaint.pipeline.look import spoken_move
 from lightpaint.placement.freedom import FreeLight
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.pose import Site

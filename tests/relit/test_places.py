@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.pipeline.results.result_folder import with_places
+from lightpaint.pipeline.result_folder import with_places
 from lightpaint.progress import silent
 from lightpaint.relit.export.fixtures import fixtures_csv, pan_and_tilt
 from lightpaint.relit.exported_answer import Source

@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.basis.light_basis import Basis
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.problem import Problem
-from lightpaint.pipeline.results.look import Look
+from lightpaint.pipeline.look import Look
 from lightpaint.relit.verification import compare
 from lightpaint.scene.mitsuba_scene import Scene
 

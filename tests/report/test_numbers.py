@@ -23,7 +23,7 @@ from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.unknowns import reduced_problem
-from lightpaint.pipeline.results.look import Look, write_report
+from lightpaint.pipeline.look import Look, write_report
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import compare
 from lightpaint.target.painted_target import Target

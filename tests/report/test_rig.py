@@ -11,15 +11,15 @@ from PIL import ImageDraw
 
 from lightpaint.images.denoiser import Features
 from lightpaint.report.contact_sheet import light_sheet
-from lightpaint.report.page.placement_section import aim_picture, placement_section
-from lightpaint.report.rig.hung_lights import (
+from lightpaint.report.hung_lights import (
     HungLight,
     HungLights,
     LightChange,
     ViewGeometry,
     spoken_fraction,
 )
-from lightpaint.report.rig.rig_drawing import CHANGED, FINER, plan_and_elevation, rig_drawing
+from lightpaint.report.page.placement_section import aim_picture, placement_section
+from lightpaint.report.rig_drawing import CHANGED, FINER, plan_and_elevation, rig_drawing
 from lightpaint.scene.properties.site import EmitterPlace, Site
 
 EYE, FOCAL, SIZE = np.array([0.5, 1.5, 4.0]), 60.0, (48, 64)

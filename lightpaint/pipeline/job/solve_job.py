@@ -36,8 +36,8 @@ from lightpaint.pipeline.job.sources import (
     observer_of,
     spectral_scene,
 )
-from lightpaint.pipeline.results.look import SOLVE_RESULTS, VIEW_RESULTS, checked_names, view_names
-from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
+from lightpaint.pipeline.look import SOLVE_RESULTS, VIEW_RESULTS, checked_names, view_names
+from lightpaint.pipeline.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
 from lightpaint.relit import plugin_remark, spoken_unreadable
 from lightpaint.scene import Scene

@@ -11,7 +11,7 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import delta_e, luminance, matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import (
+from lightpaint.colour.spectrum import (
     WAVELENGTHS,
     Spectrum,
     named_spectrum,

@@ -15,7 +15,7 @@ from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.color import ciede2000, delta_e, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.spectra.spectrum import (
+from lightpaint.colour.spectrum import (
     EYE,
     WAVELENGTHS,
     Observer,

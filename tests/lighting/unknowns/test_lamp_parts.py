@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.spectra.color_rendering import fidelity
-from lightpaint.colour.spectra.spectrum import rgb_of_powers
+from lightpaint.colour.color_rendering import fidelity
+from lightpaint.colour.spectrum import rgb_of_powers
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.analysis.rendered_colors import renderings_of

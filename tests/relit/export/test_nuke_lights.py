@@ -16,7 +16,7 @@ from renderer import LIGHTS, SCREEN, write_room
 
 import lightpaint as lp
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.pipeline.results.result_folder import with_places
+from lightpaint.pipeline.result_folder import with_places
 from lightpaint.relit.export.nuke import STRAIGHT, rotate_of
 from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms

@@ -21,7 +21,7 @@ from lightpaint.files import check_files, check_writable, one_line, read_text, w
 from lightpaint.lighting import Lighting, write_lighting
 from lightpaint.photometry import Glare, Illuminance, readings_files, write_readings
 from lightpaint.photometry.planes_file import plane_names
-from lightpaint.pipeline.results.look import RESULTS
+from lightpaint.pipeline.look import RESULTS
 from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
 from lightpaint.scene import Scene, load_scene
 from lightpaint.sentences import Hint, Sentence

@@ -26,7 +26,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour.color import cct_and_duv
 from lightpaint.colour.primaries import REC709, adaptation, colour_science, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import (
+from lightpaint.colour.spectrum import (
     STEP,
     WAVELENGTHS,
     Spectrum,

@@ -1,1 +1,0 @@
-"""The results of a run: its folder, and the files of its answer."""
