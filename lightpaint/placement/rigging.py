@@ -19,7 +19,7 @@ from lightpaint.placement.freedom import EDGE
 from lightpaint.scene import FARTHEST
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests
 from lightpaint.sentences import SourceKey
-from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number, parse_number
+from lightpaint.validation import MAX_LISTED, MAX_NAME, Check, is_number, parse_number
 
 #: A table of keys and values, and the name of its source in errors; the same with a name before it.
 Table = tuple[Mapping[str, Any], SourceKey]
@@ -28,18 +28,10 @@ NamedTable = tuple[str, Mapping[str, Any], SourceKey]
 #: Maximum length of an error, which may quote a long value.
 MAX_MESSAGE_LENGTH = 1000
 
-#: Keys of permitted places; keys of a rail or surface.
-PLACE_KEYS = ("within", "box", "along", "on")
-ON_KEYS = ("line", "shapes", "clear")
-
 #: Kinds of new lights.
 LIGHT_KINDS = ("point", "spot", "panel")
 
-#: Keys of a light to add: for its place and pose, and for its constraints.
-NEW_KEYS = (
-    *("kind", "like", "name", "count", "on", "box"),
-    *("aim", "cone", "beam", "size", "apart", "in_view"),
-)
+#: Keys of a light to add for its constraints.
 NEW_CONSTRAINTS = ("limits", "color", "kelvin", "duv", "primaries")
 
 #: Maximum number of lights that one table adds: a larger number is a typing error.
@@ -185,71 +177,141 @@ def _text(value: Any) -> str:
     return f"{value:g}" if is_number else str(value)
 
 
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and 0 < len(value) <= MAX_NAME
+
+
+def _is_list(value: Any, count: int) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == count
+
+
+def _is_point(value: Any) -> bool:
+    return _is_list(value, 3) and all(is_number(x) and abs(x) <= FARTHEST for x in value)
+
+
+def _is_segment(value: Any) -> bool:
+    return _is_list(value, 2) and all(map(_is_point, value))
+
+
+def _is_range(value: Any, least: float) -> bool:
+    """Return whether it is two angles in degrees, above `least`."""
+    return _is_list(value, 2) and all(map(is_number, value)) and least < value[0] <= value[1] < 90
+
+
+def _are_names(value: Any) -> bool:
+    listed = (value,) if isinstance(value, str) else value
+    is_list = isinstance(listed, Sequence) and 0 < len(listed) <= MAX_LISTED
+    return is_list and all(map(_is_name, listed))
+
+
+def _are_sides(value: Any) -> bool:
+    sides = [value, value] if is_number(value) else value
+    return (
+        _is_list(sides, 2) and all(map(is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
+    )
+
+
+_NAME = Check(_is_name, "the name of a light")
+_NAMES = Check(_are_names, 'a name or a list of names, ["a", "b"]')
+_BOX = Check(_is_segment, "two corners, [[x, y, z], [x, y, z]]")
+
+#: Keys of permitted places.
+PLACES = {
+    "within": Check(lambda x: is_number(x) and 0 < x <= FARTHEST, "a distance > 0, like 1.0"),
+    "box": _BOX,
+    "along": Check(lambda x: _is_point(x) and any(x), "a direction, like [0, 0, 1]"),
+    "on": _NAMES,
+}
+#: Keys of a rail or surface.
+RAILS = {
+    "line": Check(
+        lambda x: _is_segment(x) and list(x[0]) != list(x[1]),
+        "two different points, [[x, y, z], [x, y, z]]",
+    ),
+    "shapes": _NAMES,
+    "clear": Check(
+        lambda x: is_number(x) and 0 <= x <= FARTHEST, "the distance from the surface, like 0.1"
+    ),
+}
+#: Keys of a light's directions, cone and beam.
+TURNS = {
+    "aim": Check(
+        lambda x: isinstance(x, bool) or (is_number(x) and 0 < x <= 180),
+        "degrees from 0 to 180, or true for any direction",
+    ),
+    "cone": Check(lambda x: _is_range(x, 1), "two angles, from 1 to 90 degrees, like [10, 45]"),
+    "beam": Check(
+        lambda x: isinstance(x, bool) or _is_range(x, EDGE),
+        f"two angles, from {EDGE:g} to 90 degrees, like [5, 20], or true for any in the cone",
+    ),
+}
+#: Keys of a light to add, for its place and pose.
+NEW_LIGHTS = {
+    "kind": Check(lambda x: x in LIGHT_KINDS, f"one of {', '.join(LIGHT_KINDS)}"),
+    "like": _NAME,
+    "name": _NAME,
+    "count": Check(
+        lambda x: type(x) is int and 1 <= x <= MAX_COUNT, f"a whole number from 1 to {MAX_COUNT}"
+    ),
+    "on": _NAMES,
+    "box": _BOX,
+    "apart": Check(lambda x: is_number(x) and 0 <= x <= FARTHEST, "a distance >= 0, like 0.5"),
+    "in_view": Check(lambda x: isinstance(x, bool), "true or false"),
+    "size": Check(_are_sides, "the smallest and the largest side, like [0.3, 0.6]"),
+    **TURNS,
+}
+
+
+def _check_values(table: Mapping[str, Any], checks: Mapping[str, Check], where: SourceKey) -> None:
+    """Raise ConstraintError for the first invalid value of a key that has a check."""
+    for key, check in checks.items():
+        if key in table and not check.is_valid(table[key]):
+            raise _wrong(where / key, table[key], check.expectation)
+
+
 def _check_move(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless these are valid values of `move`, `aim`, `cone`, `beam`."""
     check_keys(table, MOVES, where)
     if "move" in table:
         _check_places(table["move"], where / "move")
-    _check_turns(table, where)
+    _check_values(table, TURNS, where)
 
 
 def _check_on(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless it is a rail, or a surface of shapes."""
-    check_keys(table, ON_KEYS, where)
+    check_keys(table, RAILS, where)
     if ("line" in table) == ("shapes" in table):
         raise ConstraintError(
             where,
             f" has {'both line and' if 'line' in table else 'neither line nor'} shapes: "
             "expected line, two points of a rail, or shapes, a list of names",
         )
-    if "line" in table:
-        ends = table["line"]
-        if not _is_segment(ends) or list(ends[0]) == list(ends[1]):
-            raise _wrong(where / "line", ends, "two different points, [[x, y, z], [x, y, z]]")
-        if "clear" in table:
-            raise ConstraintError(where / "clear", " is for shapes: a rail hangs where its line is")
-        return
-    names_of(table["shapes"], where / "shapes")
-    if "clear" in table and not (is_number(table["clear"]) and 0 <= table["clear"] <= FARTHEST):
-        raise _wrong(where / "clear", table["clear"], "the distance from the surface, like 0.1")
+    _check_values(table, RAILS, where)
+    if {"line", "clear"} <= table.keys():
+        raise ConstraintError(where / "clear", " is for shapes: a rail hangs where its line is")
 
 
 def _check_new(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless it describes lights to add."""
-    check_keys(table, (*NEW_KEYS, *NEW_CONSTRAINTS), where)
+    check_keys(table, (*NEW_LIGHTS, *NEW_CONSTRAINTS), where)
     if ("kind" in table) == ("like" in table):
         raise ConstraintError(
             where,
             f" has {'both kind and' if 'kind' in table else 'neither kind nor'} like: "
             f"expected kind, {', '.join(LIGHT_KINDS)}, or like, the name of a light",
         )
+    _check_values(table, {"kind": NEW_LIGHTS["kind"]}, where)
     kind = table.get("kind", "")
-    if "kind" in table and kind not in LIGHT_KINDS:
-        raise _wrong(where / "kind", kind, f"one of {', '.join(LIGHT_KINDS)}")
-    for key in ("like", "name"):
-        if key in table and not _is_name(table[key]):
-            raise _wrong(where / key, table[key], "the name of a light")
-    count = table.get("count", 1)
-    if not (type(count) is int and 1 <= count <= MAX_COUNT):
-        raise _wrong(where / "count", count, f"a whole number from 1 to {MAX_COUNT}")
     if "on" in table and "box" in table:
         raise ConstraintError(where, " has both on and box: leave one out")
-    if "on" in table:
-        names_of(table["on"], where / "on")
-    if "box" in table and not _is_segment(table["box"]):
-        raise _wrong(where / "box", table["box"], "two corners, [[x, y, z], [x, y, z]]")
-    if "apart" in table and not (is_number(table["apart"]) and 0 <= table["apart"] <= FARTHEST):
-        raise _wrong(where / "apart", table["apart"], "a distance >= 0, like 0.5")
-    if not isinstance(table.get("in_view", True), bool):
-        raise _wrong(where / "in_view", table["in_view"], "true or false")
-    if "size" in table:
-        _check_size(table["size"], kind, where / "size")
+    if "size" in table and kind not in ("panel", ""):
+        raise ConstraintError(where / "size", f" is for panels: a {kind} has no size")
     for key in ("cone", "beam"):
         if kind in ("point", "panel") and key in table:
             raise ConstraintError(where, f" has the key {key!r}: a {kind} has none")
     if kind == "point" and "aim" in table:
         raise ConstraintError(where, " has the key 'aim': a point light points nowhere")
-    _check_turns(table, where)
+    _check_values(table, NEW_LIGHTS, where)
     LightConstraint.of(constraint_of(table), where=where)
 
 
@@ -281,14 +343,9 @@ def mirror_of(value: Any, where: SourceKey) -> tuple[int, float]:
 
 def names_of(value: Any, where: SourceKey) -> tuple[str, ...]:
     """Return a name, or a list of names."""
-    listed = (value,) if isinstance(value, str) else value
-    if (
-        not isinstance(listed, Sequence)
-        or not 0 < len(listed) <= MAX_LISTED
-        or not all(map(_is_name, listed))
-    ):
-        raise _wrong(where, value, 'a name or a list of names, ["a", "b"]')
-    return tuple(listed)
+    if not _are_names(value):
+        raise _wrong(where, value, _NAMES.expectation)
+    return (value,) if isinstance(value, str) else tuple(value)
 
 
 def _check_places(value: Any, where: SourceKey) -> None:
@@ -297,72 +354,16 @@ def _check_places(value: Any, where: SourceKey) -> None:
         value = {"within": value}
     if not isinstance(value, Mapping):
         raise _wrong(where, value, "a distance, like 1.0, or a table, { within = 1.0 }")
-    check_keys(value, PLACE_KEYS, where)
-    given_keys = [key for key in PLACE_KEYS if key in value]
+    check_keys(value, PLACES, where)
+    given_keys = [key for key in PLACES if key in value]
     if given_keys not in (["within"], ["box"], ["on"], ["within", "along"]):
         raise ConstraintError(
             where,
             f" has {' and '.join(given_keys) or 'nothing'}: expected one of within, box, "
             "on, along and within",
         )
-    if "within" in value and not (is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
-        raise _wrong(where / "within", value["within"], "a distance > 0, like 1.0")
-    if "box" in value and not _is_segment(value["box"]):
-        raise _wrong(where / "box", value["box"], "two corners, [[x, y, z], [x, y, z]]")
-    if "along" in value and not (_is_point(value["along"]) and any(value["along"])):
-        raise _wrong(where / "along", value["along"], "a direction, like [0, 0, 1]")
-    if "on" in value:
-        names_of(value["on"], where / "on")
-
-
-def _check_turns(table: Mapping[str, Any], where: SourceKey) -> None:
-    """Raise ConstraintError for invalid values of `aim`, `cone` and `beam`."""
-    aim = table.get("aim", True)
-    if not isinstance(aim, bool) and not (is_number(aim) and 0 < aim <= 180):
-        raise _wrong(where / "aim", aim, "degrees from 0 to 180, or true for any direction")
-    if "cone" in table and not _is_range(table["cone"], 1):
-        raise _wrong(
-            where / "cone", table["cone"], "two angles, from 1 to 90 degrees, like [10, 45]"
-        )
-    beam = table.get("beam", True)
-    if not isinstance(beam, bool) and not _is_range(beam, EDGE):
-        raise _wrong(
-            where / "beam",
-            beam,
-            f"two angles, from {EDGE:g} to 90 degrees, like [5, 20], or true for any in the cone",
-        )
-
-
-def _is_range(value: Any, least: float) -> bool:
-    """Return whether it is two angles in degrees, above `least`."""
-    return _is_list(value, 2) and all(map(is_number, value)) and least < value[0] <= value[1] < 90
-
-
-def _check_size(value: Any, kind: str, where: SourceKey) -> None:
-    if kind not in ("panel", ""):
-        raise ConstraintError(where, f" is for panels: a {kind} has no size")
-    sides = [value, value] if is_number(value) else value
-    if not (
-        _is_list(sides, 2) and all(map(is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
-    ):
-        raise _wrong(where, value, "the smallest and the largest side, like [0.3, 0.6]")
+    _check_values(value, PLACES, where)
 
 
 def _wrong(where: SourceKey, value: Any, expected: str) -> ConstraintError:
     return ConstraintError(where, f" is {one_line(repr(value))}: expected {expected}")
-
-
-def _is_segment(value: Any) -> bool:
-    return _is_list(value, 2) and all(map(_is_point, value))
-
-
-def _is_point(value: Any) -> bool:
-    return _is_list(value, 3) and all(is_number(x) and abs(x) <= FARTHEST for x in value)
-
-
-def _is_list(value: Any, count: int) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == count
-
-
-def _is_name(value: Any) -> bool:
-    return isinstance(value, str) and 0 < len(value) <= MAX_NAME

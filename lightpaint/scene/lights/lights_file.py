@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint import validation
 from lightpaint.colour import file_of_spectrum
 from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
@@ -18,7 +19,6 @@ from lightpaint.luminaires import LUMINAIRE_KEYS, PHOTOMETRY, LuminaireRequest, 
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, parse_size
 from lightpaint.storage.json_records import strict_toml
-from lightpaint.validation import BRIGHTEST, MAX_LISTED, MAX_NAME, is_number
 
 SUFFIX = ".lights.toml"
 #: Keys of constraints for the solve.
@@ -61,25 +61,37 @@ class SceneRequests:
         return cls({key: data[key] for key in keys if key in data}, str(path))
 
     @property
-    def split(self) -> dict[str, GridSize | TexelLayout]:
-        """Columns and rows, or layouts, of images to split into texels, by name of the light."""
+    def _tables(self) -> dict[str, Mapping[str, Any]]:
+        """The tables `[light.NAME]`; `constraints_of` refuses anything else there."""
         lights = self.keys.get("light")
         tables = lights.items() if isinstance(lights, dict) else ()
+        return {name: table for name, table in tables if isinstance(table, dict)}
+
+    def _values(self, key: str, check: validation.Check) -> dict[str, Any]:
+        """Return the values of a key by the names of the lights that have it. Raises SceneError."""
+        values = {name: table[key] for name, table in self._tables.items() if key in table}
+        for name, value in values.items():
+            if not check.is_valid(value):
+                raise SceneError(
+                    f"{self.source}: light.{name}.{key} is {one_line(repr(value))}: expected "
+                    f"{check.expectation}"
+                )
+        return values
+
+    @property
+    def split(self) -> dict[str, GridSize | TexelLayout]:
+        """Columns and rows, or layouts, of images to split into texels, by name of the light."""
         return {
             name: parse_size(table[SPLIT], f"{self.source}: light.{name}.{SPLIT}")
-            for name, table in tables
-            if isinstance(table, dict) and SPLIT in table
+            for name, table in self._tables.items()
+            if SPLIT in table
         }
 
     @property
     def lamps(self) -> tuple[str, ...]:
         """Names and patterns of the lights whose emitters it lists."""
-        lights = self.keys.get("light")
-        tables = lights.items() if isinstance(lights, dict) else ()
         return tuple(
-            name
-            for name, table in tables
-            if isinstance(table, dict) and ("emitters" in table or PHOTOMETRY in table)
+            name for name, table in self._tables.items() if {"emitters", PHOTOMETRY} & table.keys()
         )
 
     @property
@@ -89,7 +101,7 @@ class SceneRequests:
         Raises SceneError for an invalid value.
         """
         value = self.keys.get("cd_per_unit", 1.0)
-        if not (is_number(value) and 0 < value <= BRIGHTEST):
+        if not (validation.is_number(value) and 0 < value <= validation.BRIGHTEST):
             raise SceneError(
                 f"{self.source}: cd_per_unit is {one_line(repr(value))}: expected candelas of an "
                 "intensity of 1 in the scene, like 1"
@@ -128,9 +140,7 @@ class SceneRequests:
     @property
     def spectrum_files(self) -> tuple[Path, ...]:
         """The files of the spectra of its emitters."""
-        lights = self.keys.get("light")
-        tables = lights.values() if isinstance(lights, dict) else ()
-        lists = [x.get("emitters") for x in tables if isinstance(x, dict)]
+        lists = [x.get("emitters") for x in self._tables.values()]
         emitters = [x for found in lists if isinstance(found, list) for x in found]
         spectra = [x.get("spectrum") for x in emitters if isinstance(x, dict)]
         files = dict.fromkeys(file_of_spectrum(x) for x in spectra if isinstance(x, str))
@@ -139,34 +149,15 @@ class SceneRequests:
     @property
     def symmetric(self) -> frozenset[str]:
         """Names of the lights whose images are symmetric."""
-        lights = self.keys.get("light")
-        tables = lights.items() if isinstance(lights, dict) else ()
-        names = set()
-        for name, table in tables:
-            value = table.get(SYMMETRIC, False) if isinstance(table, dict) else False
-            if not isinstance(value, bool):
-                raise SceneError(
-                    f"{self.source}: light.{name}.{SYMMETRIC} is {one_line(repr(value))}: expected "
-                    "true or false"
-                )
-            names |= {name} if value else set()
-        return frozenset(names)
+        values = self._values(SYMMETRIC, replace(validation.SWITCH, expectation="true or false"))
+        return frozenset(name for name, value in values.items() if value)
 
     @property
     def sun(self) -> dict[str, int]:
         """Number of texels that a sky may get more where a sun is, by name of the light."""
-        lights = self.keys.get("light")
-        tables = lights.items() if isinstance(lights, dict) else ()
-        counts = dict[str, int]()
-        for name, table in tables:
-            count = table.get(SUN, 0) if isinstance(table, dict) else 0
-            if isinstance(count, bool) or not isinstance(count, int) or count < 0:
-                raise SceneError(
-                    f"{self.source}: light.{name}.{SUN} is {one_line(repr(count))}: expected how "
-                    "many texels more the sky may get, such as 72"
-                )
-            counts |= {name: count} if count else {}
-        return counts
+        expectation = "how many texels more the sky may get, such as 72"
+        counts = self._values(SUN, replace(validation.whole(0), expectation=expectation))
+        return {name: count for name, count in counts.items() if count}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -272,10 +263,10 @@ def read_keys(path: Path) -> dict[str, Any]:
         )
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
-    if (count := sum(1 for _ in _texts_in(data))) > MAX_LISTED:
-        raise SceneError(f"{path} names {count} lights: expected at most {MAX_LISTED}")
-    if any(len(text) > MAX_NAME for text in _texts_in(data)):
-        raise SceneError(f"{path} has a name of more than {MAX_NAME} characters")
+    if (count := sum(1 for _ in _texts_in(data))) > validation.MAX_LISTED:
+        raise SceneError(f"{path} names {count} lights: expected at most {validation.MAX_LISTED}")
+    if any(len(text) > validation.MAX_NAME for text in _texts_in(data)):
+        raise SceneError(f"{path} has a name of more than {validation.MAX_NAME} characters")
     return data
 
 
