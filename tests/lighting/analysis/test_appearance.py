@@ -94,6 +94,38 @@ def test_a_light_is_undetermined_where_its_error_may_be_all_that_is_missing(
     assert with_undetermined(appearance, solution, uncertain).hidden_lights == hidden
 
 
+@pytest.mark.parametrize(
+    ("painted", "ends", "hidden"),
+    [
+        (0.8, (0.75, 1.1), ("left",)),
+        (0.8, (0.85, 1.5), ()),
+        (1.2, (0.5, 1.25), ("left",)),
+        (1.2, (0.5, 1.1), ()),
+    ],
+)
+def test_an_error_and_the_miss_that_it_explains_are_of_the_same_pixels_and_of_one_sign(
+    make_basis: Any, painted: float, ends: tuple[float, float], hidden: tuple[str, ...]
+):
+    """A light of 1 is a fifth off: so is the block with most of the error, whose mean is .75.
+
+    A block beside it, with less of the error, is brighter.
+    """
+    images = np.full((2, *SIZE, 3), 0.01)
+    images[0, :8, :8], images[0, :8, :8:8], images[0, :8, 8:16] = 0, 6, 2
+    basis = make_basis(images=images, names=["left", "right"], emission=[[1] * 3] * 2)
+    image, everywhere = painted * basis.images[0] + basis.images[1], np.ones(SIZE, np.float32)
+    locked = Constraints.of({"*": {"lock": True}})
+    solution = solve(basis, Target("ball", image, everywhere, everything=True), constraints=locked)
+    appearance, bars = compare_appearance(solution), error_bars(solution)
+    assert appearance.place is not None
+    assert appearance.place.box == (0, 0, 8, 8)
+    assert appearance.place.reached[0] > 1.3
+    assert bars is not None
+    low, high = (np.full((2, 3), x) for x in ends)
+    uncertain = replace(bars, interval=(low, high))
+    assert with_undetermined(appearance, solution, uncertain).undetermined_lights == hidden
+
+
 def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     dark = make_basis(images=basis.images, names=basis.names, emission=[[0.2 / 64] * 3] * 2)

@@ -332,18 +332,36 @@ def undetermined_at(solution: Solution, place: Place, uncertainty: Uncertainty) 
 
     A light of known weight takes no part, whatever the samples say of the others.
     """
-    low, high = uncertainty.interval
-    errors = np.nan_to_num(high - low) / 2 * _local_light(solution, place)  # (n, 3)
-    missed = luminance(np.abs(np.subtract(place.painted, place.reached)))
-    names = solution.basis.names
-    return tuple(name for name, x in zip(names, luminance(errors), strict=True) if x >= missed > 0)
-
-
-def _local_light(solution: Solution, place: Place) -> Doubles:
-    """Return the mean light of each light at a place, at unit emission, (n, 3)."""
     top, left, bottom, right = place.box
-    rows = solution.basis.planes.rows(top, bottom)
-    return np.asarray(rows[:, :, left:right].mean(axis=(1, 2), dtype=np.float64))
+    box, views = (slice(top, bottom), slice(left, right)), solution.problem.views
+    missed = target_light(views)[box] - solution.basis.predict(solution.weights).image[box]
+    missed[at_least_mask(views)[box]] = np.maximum(missed[at_least_mask(views)[box]], 0)
+    weight = solution.importance[box]
+    if not weight.any():
+        return ()
+    # Both are means over the paint of the same pixels: of other pixels, no error explains a miss.
+    missing = float(luminance(np.average(missed, axis=(0, 1), weights=_in_channels(weight))))
+    low, high = uncertainty.interval
+    errors = np.nan_to_num(high - solution.weights if missing > 0 else solution.weights - low)
+    possible = luminance(errors * _local_light(solution, place, weight))
+    names = solution.basis.names
+    return tuple(name for name, x in zip(names, possible, strict=True) if x >= abs(missing) > 0)
+
+
+def _local_light(solution: Solution, place: Place, weight: Floats | None = None) -> Doubles:
+    """Return the mean light of each light at a place, at unit emission, (n, 3).
+
+    weight: (h, w), of its pixels; None for equal weights.
+    """
+    top, left, bottom, right = place.box
+    rows = solution.basis.planes.rows(top, bottom)[:, :, left:right].astype(np.float64)
+    weights = None if weight is None else np.broadcast_to(_in_channels(weight), rows.shape)
+    return np.asarray(np.average(rows, axis=(1, 2), weights=weights), np.float64)
+
+
+def _in_channels(weight: Floats) -> Floats:
+    """Return the weight of pixels, (h, w), in each channel, (h, w, 3)."""
+    return np.repeat(weight[..., None], 3, axis=2)
 
 
 @dataclass(frozen=True)
