@@ -101,8 +101,7 @@ def verdict(
 def _appearance_of(solution: lighting.Solution, predicted: Estimate) -> lighting.Appearance:
     """Compare an answer with its painting, and find out what its samples cannot tell there."""
     appearance = lighting.compare_appearance(solution, predicted)
-    has_miss = appearance.place is not None and not appearance.is_close
-    uncertainty = lighting.error_bars(solution) if has_miss else None
+    uncertainty = lighting.error_bars(solution) if appearance.has_miss else None
     if uncertainty is None:
         return appearance
     return lighting.with_undetermined(appearance, solution, uncertainty)
@@ -198,7 +197,7 @@ def spoken_lack(appearance: lighting.Appearance, wish: lighting.Delivery) -> str
 
 
 def _paint_headline(appearance: lighting.Appearance) -> str:
-    if appearance.is_close and not (appearance.is_spot and appearance.place):
+    if appearance.is_close and not appearance.has_miss:
         # A mean ΔE of more than CLOSE is shown beside it, if noise is what is above.
         is_noisy = round(appearance.delta_e, 1) > lighting.CLOSE
         return f"Close: {'apart from noise, ' if is_noisy else ''}it looks as painted."
@@ -341,12 +340,18 @@ def spoken_holding(reason: lighting.Reason) -> str:
 
 
 def spoken_noise(appearance: lighting.Appearance) -> str:
-    """Return a clause on noise, if it is a third of the error; else ""."""
-    share = phrases.spoken_percent(appearance.noise_shares.get(appearance.main_noise, 0.0))
+    """Return a clause on noise, if it is a third of the error; else "".
+
+    Only a share of ΔE, which stands beside it, is a share of "the difference" without more words.
+    """
     if appearance.main_noise == "noise":
+        share = phrases.spoken_percent(appearance.noise_share)
         return f"{share} of the difference from the painting is render noise"
     if appearance.main_noise == "painting_noise":
-        return f"{share} of the difference from the painting is finer detail than light can show"
+        share = phrases.spoken_percent(appearance.error_shares["painting_noise"])
+        return f"{share} of the difference (in energy) is finer detail than light can show"
+    if appearance.main_noise == "energy":
+        return "much of the difference (in energy) is render noise, which more samples reduce"
     return ""
 
 

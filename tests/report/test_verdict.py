@@ -24,6 +24,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
+from lightpaint.report import verdict_sentences
 from lightpaint.report.verdict_sentences import headline, verdict
 from lightpaint.target.painted_target import Target
 
@@ -184,6 +185,11 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
             "difference from the painting is render noise.",
         ),
         (
+            _seen(2.7, 3.9, noise=0.4, is_spot=True, error_shares={"noise": 0.93}),
+            "Close, but the brighter light in the middle is missing: much of the difference (in "
+            "energy) is render noise, which more samples reduce.",
+        ),
+        (
             Appearance(14.0, 0.0, 20.0),
             "These lights cannot match this: too much of what was painted is out of reach.",
         ),
@@ -200,7 +206,7 @@ SAID = {
     "unreachable": "is out of reach: lamp would light too much else.",
     "forbidden": "is out of reach: lamp would light too much else.",
     "noise": "of the difference from the painting is render noise.",
-    "painting_noise": "of the difference from the painting is finer detail than light can show.",
+    "painting_noise": "of the difference (in energy) is finer detail than light can show.",
 }
 
 
@@ -216,6 +222,21 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
     assert all(parts.get(x, 0) >= HEADLINE_SHARE for x in causes if x == part)
     assert (part in causes) == (share >= HEADLINE_SHARE)
     assert ("none of which accounts for a third" in sentence) == (share < HEADLINE_SHARE)
+
+
+def test_a_spot_of_a_close_answer_is_laid_on_no_light_that_samples_do_not_tell(
+    make_basis: BasisFactory, monkeypatch: pytest.MonkeyPatch
+):
+    """One that was not shown with an appearance finds out, as it does for answers that are far."""
+    noise = np.random.default_rng(4).normal(0, 8, (2, 2, 16, 16, 3))
+    noise[:, 0] = 0
+    basis = make_basis(images=0.5 + noise[0], half_differences=noise[1], names=["lamp", "bulb"])
+    solution = solve(basis, Target.of(basis.images[0], name="lamp"), literal=True)
+    seen = _seen(2.0, is_spot=True, local_lights=("bulb",))
+    monkeypatch.setattr(verdict_sentences, "compare_appearance", lambda *_: seen)
+    sentence = verdict(solution, combine(basis, solution.lighting), None)
+    start = "Close, but the brighter light in the middle is missing: "
+    assert sentence.startswith(f"{start}too few samples tell what bulb can do there.")
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])

@@ -204,19 +204,23 @@ class Appearance:
         return tuple(name for name in names if name in self.undetermined_lights)
 
     @property
-    def noise_shares(self) -> dict[str, float]:
-        """The share of ΔE that render noise explains, and the share of the painting's noise in the
-        error of the fit.
-        """
-        noise = self.noise / self.delta_e if self.delta_e > 0 else 0.0
-        return {"noise": noise, "painting_noise": self.error_shares.get("painting_noise", 0.0)}
+    def noise_share(self) -> float:
+        """The share of ΔE that render noise explains."""
+        return self.noise / self.delta_e if self.delta_e > 0 else 0.0
 
     @property
     def main_noise(self) -> str:
-        """`noise` or `painting_noise`, if a third of the error is that; else ""."""
-        noise_shares = self.noise_shares
-        part = max(noise_shares, key=noise_shares.__getitem__)
-        return part if noise_shares[part] >= HEADLINE_SHARE else ""
+        """`noise`, if render noise explains a third of ΔE; else `painting_noise` or `energy`, if
+        noise of the painting or of the basis is a third of the error of the fit; else "".
+
+        A few bright pixels can have most of that error, and little of ΔE.
+        """
+        painting, basis = (self.error_shares.get(x, 0.0) for x in ("painting_noise", "noise"))
+        if self.noise_share >= max(HEADLINE_SHARE, painting):
+            return "noise"
+        if painting >= HEADLINE_SHARE:
+            return "painting_noise"
+        return "energy" if basis >= HEADLINE_SHARE else ""
 
     @property
     def is_at_cost(self) -> bool:
@@ -296,6 +300,13 @@ class Appearance:
         return self.is_nearly_equal and self.worst_wish is None
 
     @property
+    def has_miss(self) -> bool:
+        """True if something is missing at `place`: in an answer that is not close, or in a spot of
+        one that is.
+        """
+        return self.place is not None and (not self.is_close or self.is_spot)
+
+    @property
     def is_far(self) -> bool:
         """True if it looks like another picture, or still like the current one.
 
@@ -347,7 +358,7 @@ def compare_appearance(
         return appearance
     place, share = place_with_most_error(look, missed, light, grain)
     appearance = replace(appearance, place=place, is_spot=share >= SPOT)
-    if appearance.is_close and not appearance.is_spot:
+    if not appearance.has_miss:
         return appearance
     if (area := _worst_area(appearance, delivered)) is not None:
         look = look.within(area)
