@@ -179,8 +179,7 @@ def remove_keys(owner, memory):
     """Delete the keyframes that lightpaint has inserted into a lamp, a material or a world."""
     if not memory.get(KEYED):
         return
-    target = owner if owner.bl_rna.identifier.endswith("Light") else None
-    for animated in [target] if target else [owner, owner.node_tree]:
+    for animated in (owner, owner.node_tree):
         if animated is None:
             continue
         remove_curves(animated, memory[KEYED])

@@ -29,18 +29,18 @@ SPACES = {
 }
 
 
-def scaled(base, factor, space=None):
+def scaled(base, factor, space=None, tint=None):
     """Return [level, red, green, blue] multiplied by a factor for each channel of Rec.709.
 
     The level takes the factor's mean and the colour the rest, so that a change of brightness alone
     leaves the colour as it is. A light that goes out keeps its colour. space: as
-    `working_space` returns it.
+    `working_space` returns it. tint: what else multiplies the colour, in that space.
     """
     level, *colour = base
     mean = sum(factor) / 3
     if not all(map(math.isfinite, factor)) or mean <= 0:
         return [0.0, *colour]
-    return [level * mean, *(c / mean for c in multiplied(colour, factor, space))]
+    return [level * mean, *(c / mean for c in multiplied(colour, factor, space, tint))]
 
 
 def scaled_colour(base, factor, space=None):
@@ -87,15 +87,25 @@ def working_space(data):
     return SPACES.get(getattr(settings, "working_space_interop_id", ""))
 
 
-def multiplied(colour, factor, space=None):
+def multiplied(colour, factor, space=None, tint=None):
     """Return a colour of a file with red, green and blue of Rec.709 multiplied, at least 0.
 
-    space: as `working_space` returns it.
+    space: as `working_space` returns it. tint: of a colour that is multiplied by another of the
+    file, that one: their product is what is multiplied.
     """
     if space is None:
         return [c * f for c, f in zip(colour, factor, strict=True)]
-    shown = [f * c for c, f in zip(_solved(space, colour), factor, strict=True)]
-    return [max(sum(m * c for m, c in zip(row, shown, strict=True)), 0.0) for row in space]
+    tint = [t if t > 0 else 1.0 for t in tint or (1.0, 1.0, 1.0)]
+    whole = [c * t for c, t in zip(colour, tint, strict=True)]
+    shown = [f * c for c, f in zip(_solved(space, whole), factor, strict=True)]
+    made = [sum(m * c for m, c in zip(row, shown, strict=True)) for row in space]
+    return [max(c, 0.0) / t for c, t in zip(made, tint, strict=True)]
+
+
+def inverse(matrix):
+    """Return the inverse of a matrix of three rows."""
+    units = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    return tuple(zip(*(_solved(matrix, unit) for unit in units), strict=True))
 
 
 def _solved(matrix, result):
