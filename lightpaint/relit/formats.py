@@ -141,6 +141,10 @@ def _layer(
             f"{stage_name} has {some_names(overridden.unplaced)} elsewhere than the scene, or "
             "as a mesh: place it by hand"
         )
+    if overridden.in_part:
+        listen.say(
+            f"{stage_name} hides {some_names(overridden.in_part)}, or links it to some prims alone"
+        )
     return overridden.text
 
 

@@ -82,7 +82,7 @@ def _blender() -> Any:
 
     inputs = {name: _Socket() for name in ("Color", "Strength")}
     tree = SimpleNamespace(nodes=[SimpleNamespace(type="EMISSION", inputs=inputs)])
-    material = SimpleNamespace(use_nodes=True, node_tree=tree)
+    material = SimpleNamespace(name="glow", use_nodes=True, node_tree=tree)
     lamp("bulb", "POINT")
     lamp("sun", "SUN")
     lamp("desk", "AREA", size=0.5, size_y=1.0, shape="RECTANGLE")

@@ -64,12 +64,14 @@ class Overrides:
     """The layer as text, and the names of lights that it lacks.
 
     left: names of lights that are not in it. unplaced: names of lights whose brightness is in it,
-    but not their new place.
+    but not their new place. in_part: names of lights that the stage hides, or lets shine on some
+    prims alone.
     """
 
     text: str
     left: tuple[str, ...]
     unplaced: tuple[str, ...] = ()
+    in_part: tuple[str, ...] = ()
 
 
 def check_usd() -> None:
@@ -119,11 +121,11 @@ def usd_overrides(
     # The layer's own stage is closed when this call returns: while open, it would look for
     # sublayers as soon as there are any, starting from a layer without a path.
     written = list(emitters), places, up, skies, panels
-    unset_names, unplaced = _write_lights(layer, opened_stage, *written)
+    unset_names, unplaced, in_part = _write_lights(layer, opened_stage, *written)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         like_stage(layer, stage)
-    return Overrides(layer.ExportToString(), unset_names, unplaced)
+    return Overrides(layer.ExportToString(), unset_names, unplaced, in_part)
 
 
 def _write_lights(
@@ -134,8 +136,8 @@ def _write_lights(
     up: Position,
     skies: Mapping[str, str],
     panels: Mapping[str, str],
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Write all lights into the layer; return `left` and `unplaced`, as in `Overrides`."""
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Write all lights into the layer; return `left`, `unplaced` and `in_part` of `Overrides`."""
     from pxr import Usd
 
     layer_stage = Usd.Stage.Open(layer)
@@ -177,7 +179,9 @@ def _write_lights(
             continue
         path, kind = light_prims[name]
         override(path, kind, parameter, emission)
-    return tuple(unset_names), (*unturned, *writer.move())
+    changed = [name for name in light_prims if name not in unset_names]
+    in_part = [x for x in changed if _shines_in_part(opened_stage, light_prims[x][0])]
+    return tuple(unset_names), (*unturned, *writer.move()), tuple(in_part)
 
 
 def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -230,8 +234,28 @@ def _override(prim: Any, present: Any, kind: str, parameter: str, emission: RGB)
         if present is not None and (attribute := present.GetAttribute(name)).IsAuthored():
             kind_of_value = attribute.GetTypeName()
             prim.CreateAttribute(name, kind_of_value, custom=False).Block()
-    if present is not None and UsdLux.LightAPI(present).GetFiltersRel().GetTargets():
+    if present is None:
+        return
+    stage_light = UsdLux.LightAPI(present)
+    if stage_light.GetFiltersRel().GetTargets():
         light.CreateFiltersRel().SetTargets([])
+    # The light of a mesh is multiplied by what its material emits, unless it has no material.
+    if stage_light.GetMaterialSyncModeAttr().Get() == UsdLux.Tokens.materialGlowTintsLight:
+        light.CreateMaterialSyncModeAttr(UsdLux.Tokens.noMaterialResponse)
+
+
+def _shines_in_part(opened_stage: Any, path: str) -> bool:
+    """Return whether a stage hides a light, or links it to some prims alone."""
+    from pxr import UsdGeom, UsdLux
+
+    prim = None if opened_stage is None else opened_stage.GetPrimAtPath(path)
+    if not prim:
+        return False
+    if UsdGeom.Imageable(prim).ComputeVisibility() == UsdGeom.Tokens.invisible:
+        return True
+    linked = UsdLux.LightAPI(prim).GetLightLinkCollectionAPI()
+    is_whole = linked.GetIncludeRootAttr().Get() and not linked.GetExcludesRel().GetTargets()
+    return not is_whole
 
 
 def color_space_of(prim: Any) -> Any:

@@ -70,6 +70,29 @@ def with_node_group(light):
     light.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
 
 
+def mesh_light(name):
+    """Add a mesh that is not rendered, whose nodes mix what they emit."""
+    bpy.ops.mesh.primitive_plane_add(size=0.02)
+    thing = bpy.context.object
+    thing.name, thing.hide_render = name, True
+    coated = name == "coated"
+    glow = material(name, "ShaderNodeBsdfPrincipled" if coated else "ShaderNodeEmission")
+    thing.data.materials.append(glow)
+    nodes, link = glow.node_tree.nodes, glow.node_tree.links.new
+    shader, output = nodes[0], nodes[1]
+    if coated:
+        key = "Coat Weight" if "Coat Weight" in shader.inputs else "Alpha"
+        shader.inputs[key].default_value = 0.5
+        return
+    other = nodes.new("ShaderNodeBsdfDiffuse" if name == "half" else "ShaderNodeEmission")
+    mix = nodes.new("ShaderNodeAddShader" if name == "twice" else "ShaderNodeMixShader")
+    for socket, one in zip(
+        [x for x in mix.inputs if x.type == "SHADER"], (shader, other), strict=True
+    ):
+        link(one.outputs[0], socket)
+    link(mix.outputs[0], output.inputs[0])
+
+
 def floor_and_camera():
     bpy.ops.mesh.primitive_plane_add(size=1)
     bpy.context.object.data.materials.append(
@@ -104,6 +127,9 @@ def main():
         lamp("desk", "AREA", shape="RECTANGLE", size=0.01, size_y=0.02, spread=1.0),
     ]
     lamps[-1].scale = (2, 1, 1)
+    # What was a point in the scene, and lamps that cannot have what their names had there.
+    lamps.append(lamp("tile", "AREA", shape="SQUARE", size=0.01))
+    lamp("wrong sun", "SUN").hide_render = lamp("wrong bulb", "POINT").hide_render = True
     with_nodes(lamps[0].data)
     grouped = lamp("grouped", "POINT")
     with_node_group(grouped.data)
@@ -115,6 +141,12 @@ def main():
     panel.data.materials.append(material("glow", "ShaderNodeEmission"))
     world = bpy.data.worlds.new("sky")
     scene.world, world.use_nodes = world, True
+    for name in ("half", "twice", "coated", "whole"):
+        mesh_light(name)
+    if hasattr(lamps[1], "light_linking"):
+        lamps[1].light_linking.receiver_collection = bpy.data.collections.new("all")
+        lamps[1].light_linking.receiver_collection.objects.link(bpy.data.objects["Plane"])
+    lamps[3].visible_glossy = False
     runpy.run_path(str(FOLDER / "set_scene.py"))
     radiances = {}
     for one in (*lamps, panel, None):

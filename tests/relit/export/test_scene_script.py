@@ -12,6 +12,9 @@ from nightly import nightly
 from lightpaint.colour.primaries import ACESCG, REC709, REC2020, from_rec709
 from lightpaint.relit.export.exports import scene_script
 
+#: Meshes of blender_lit.py, and whether nodes let all through that one of them emits.
+MESHES = {"half": False, "twice": False, "coated": False, "whole": True}
+
 #: Standard errors of 256 samples of a small lamp from afar, and its size over its distance.
 NOISE = 0.01
 
@@ -24,9 +27,9 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
         pytest.skip("Blender 5 (LIGHTPAINT_BPY: a Python with its module bpy)")
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
-        **dict.fromkeys(("panel", "desk", "sky"), "radiance"),
-        **dict.fromkeys(("bulb", "spot", "grouped"), "intensity"),
-        "sun": "irradiance",
+        **dict.fromkeys(("panel", "desk", "sky", *MESHES), "radiance"),
+        **dict.fromkeys(("bulb", "spot", "grouped", "tile", "wrong sun"), "intensity"),
+        **dict.fromkeys(("sun", "wrong bulb"), "irradiance"),
         "gone": "radiance",
     }
     emitters = [(name, kind, tuple(rgb)) for name, kind in kinds.items()]
@@ -34,12 +37,17 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     (tmp_path / "set_scene.py").write_text(text, encoding="utf-8")
     output = in_blender(new_blender, Path(__file__).parent / "blender_lit.py", space, tmp_path)
     assert "lightpaint: 'gone' is left as it is" in output
-    assert "lightpaint: 'dome' is left as it is" in output
+    for name in ("dome", "wrong sun", "wrong bulb"):
+        assert f"lightpaint: '{name}' is left as it is" in output
     assert "lightpaint: nodes of 'grouped' change its light" in output
     assert "nodes of 'bulb'" not in output
+    for name, is_whole in MESHES.items():
+        assert (f"nodes of '{name}'" in output) != is_whole, name
+    for name, is_seen in {"bulb": True, "spot": False, "desk": False}.items():
+        assert (f"keeps '{name}' from" in output) != is_seen, name
     values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
     # Irradiance of a white floor: I/d², L·A/d² of what is small, all of a sky π L; over π of it.
-    falls = {"bulb": 1 / 4, "spot": 1 / 4, "sun": 1.0, "sky": math.pi}
+    falls = {"bulb": 1 / 4, "spot": 1 / 4, "tile": 1 / 4, "sun": 1.0, "sky": math.pi}
     falls |= {"panel": 0.02**2 / 4, "desk": 0.02 * 0.02 / 4}
     primaries = {"ACEScg": ACESCG, "Linear Rec.2020": REC2020}.get(space, REC709)
     in_file = from_rec709(primaries) @ rgb

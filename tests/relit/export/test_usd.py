@@ -123,6 +123,29 @@ def test_what_multiplies_a_light_in_the_stage_is_reset_over_it(tmp_path: Path) -
     assert not UsdLux.RectLight.Get(relit, "/hall/lamps/panel").GetTextureFileAttr().Get()
 
 
+def test_a_mesh_shines_as_solved_whatever_its_material_emits(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    UsdLux.MeshLightAPI.Apply(UsdGeom.Mesh.Define(stage, "/hall/lamps/tube_mesh").GetPrim())
+    stage.Save()
+    overrides = usd_overrides([("tube_mesh", "radiance", RGB)], tmp_path / "hall.usda", tmp_path)
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    light = UsdLux.LightAPI(relit.GetPrimAtPath("/hall/lamps/tube_mesh"))
+    assert not overrides.left
+    # Of the schema's three values the one by which the colour of the light is all that counts.
+    assert light.GetMaterialSyncModeAttr().Get() == "noMaterialResponse"
+
+
+def test_lights_that_a_stage_hides_or_links_are_named(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    assert not usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path).in_part
+    UsdGeom.Imageable(stage.GetPrimAtPath("/hall/lamps/panel")).MakeInvisible()
+    bulb = UsdLux.LightAPI(stage.GetPrimAtPath("/hall/lamps/bulb"))
+    bulb.GetLightLinkCollectionAPI().CreateExcludesRel().AddTarget("/hall/wall")
+    stage.Save()
+    assert usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path).in_part == ("panel", "bulb")
+
+
 @pytest.mark.skipif(not hasattr(Usd, "ColorSpaceAPI"), reason="USD 24.11")
 def test_colors_are_in_the_space_of_the_stage(tmp_path: Path) -> None:
     """A stage in ACEScg; the layer's colours are read back there, by the matrix of the ACES."""
