@@ -1,9 +1,12 @@
 """The add-on beside a foreign painter: malformed frames, messages and numbers, and other hosts."""
 
+import contextlib
 import json
+import os
 import socket
 import struct
 import sys
+import threading
 import time
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -14,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.blender_addon.lamps.lamp_units import checked_factor
-from lightpaint.blender_addon.painter import painter_link
+from lightpaint.blender_addon.painter import painter_link, painter_messages
 from lightpaint.blender_addon.painter.painter_link import PainterLink, SocketClient
 from lightpaint.blender_addon.painter.painter_messages import (
     MessageError,
@@ -24,6 +27,7 @@ from lightpaint.blender_addon.painter.painter_messages import (
 )
 from lightpaint.blender_addon.painter.program import running_painter
 from lightpaint.blender_addon.painter.solves import read_factors
+from lightpaint.blender_addon.shot import shot_files
 from lightpaint.blender_addon.shot.shot_files import ShotFolder
 
 #: Seconds that a thread takes on a busy machine.
@@ -32,6 +36,7 @@ PATIENCE_S = 20.0
 LIGHTS = [{"name": "key", "is_fixed": False}, {"name": "rest", "is_fixed": True}]
 STATE: dict[str, Any] = {"kind": "state", "lights": LIGHTS, "looks": [], "master": 1.0}
 WEIGHTS = {"weights": (1.0,) * 6}
+LOOK: dict[str, Any] = {"id": 1, "name": "a", "lights": ["key"], "weights": [[1, 1, 1]]}
 
 
 @given(st.binary(max_size=64))
@@ -67,6 +72,7 @@ def described(**fields: Any) -> bytes:
         to_bytes({}),
         to_bytes([]),
         to_bytes({"kind": "answer", "master": float("nan")}),
+        to_bytes({"kind": "answer", "more": "x" * painter_messages.MAX_JSON}),
         struct.pack("<I", 2) + b"\xff\xff",
         struct.pack("<I", 200_000) + b"[" * 200_000,
         struct.pack("<I", 99) + b"{}",
@@ -98,7 +104,19 @@ def test_a_frame_with_a_fault_is_no_message(frame: bytes) -> None:
         (STATE, {"weights": (1.0,) * 5}),
         (STATE, {"weights": (1.0,) * 9}),
         *((STATE, {"weights": (bad, *(1.0,) * 5)}) for bad in (float("nan"), float("inf"), -1.0)),
-        *(({**STATE, "master": bad}, WEIGHTS) for bad in (-1.0, float("inf"), "1", [])),
+        *(
+            ({**STATE, "master": bad}, WEIGHTS)
+            for bad in (-1.0, float("inf"), "1", [], 1e200, 10**400)
+        ),
+        ({**STATE, "master": 1e20}, {"weights": (1e20,) * 6}),  # too bright together
+        (
+            {
+                **STATE,
+                "looks": [{"id": 1, "name": "a", "lights": ["key"], "weights": [[10**400, 1, 1]]}],
+            },
+            WEIGHTS,
+        ),
+        ({**STATE, "looks": [LOOK] * (painter_messages.MAX_LOOKS + 1)}, WEIGHTS),
         ({"kind": "notice"}, {}),
         ({"kind": "notice", "text": 5}, {}),
         ({"kind": "progress", "task": "a"}, {}),
@@ -116,7 +134,17 @@ def test_a_message_with_a_fault_changes_no_lamp(content: Any, buffers: Any) -> N
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, None, "1", True])
+def test_a_panel_gets_sentences_of_one_short_line() -> None:
+    state, look = PainterState(), {**LOOK, "name": "a\tb"}
+    state.receive({**STATE, "headline": "x\ny\x1b[31m " + "z" * 10**6, "looks": [look]}, WEIGHTS)
+    assert state.headline.startswith("x y [31m zzz")
+    assert len(state.headline) == painter_messages.MAX_SENTENCE
+    assert state.looks[0].name == "a b"
+
+
+@pytest.mark.parametrize(
+    "value", [float("nan"), float("inf"), -1.0, None, "1", True, 1e31, 10**400]
+)
 def test_no_light_has_such_a_factor(tmp_path: Path, value: Any) -> None:
     with pytest.raises(ValueError, match="expected three from 0 on"):
         checked_factor([1.0, value, 1.0])
@@ -168,6 +196,49 @@ def test_the_parts_of_a_message_are_bounded(monkeypatch: pytest.MonkeyPatch) -> 
         receiving(b"\x02\x01a", b"\x00\x02bc", b"\x80\x02de")
     with pytest.raises(ValueError, match="longer than a painter's"):
         receiving(b"\x02\x01a", b"\x00\x00", b"\x00\x00", b"\x00\x00")
+
+
+def test_a_painter_that_reads_nothing_does_not_hold_up_who_leaves_it() -> None:
+    here, there = socket.socketpair()
+    here.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            here.send(bytes(2**16))
+    here.setblocking(True)
+    closing = threading.Thread(target=SocketClient(here, b"").close, daemon=True)
+    closing.start()
+    closing.join(PATIENCE_S)
+    there.close()
+    assert not closing.is_alive()
+
+
+def test_messages_that_wait_are_bounded_by_their_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = painter_link._Waiting()
+    monkeypatch.setattr(painter_link, "MAX_WAITING_BYTES", 10)
+    monkeypatch.setattr(painter_link, "MAX_WAITING", 3)
+    for name, size in (("a", 4), ("b", 4), ("c", 4)):
+        waiting.add(name, size)
+    assert waiting.take() == ["b", "c"]
+    assert waiting.take() == []
+    for name in "abcde":
+        waiting.add(name, 1)
+    assert waiting.take() == ["c", "d", "e"]
+    waiting.add("one that is larger than all bounds", 11)
+    assert len(waiting.take()) == 1
+
+
+def test_an_empty_answer_to_the_handshake_is_a_refusal() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            connection.recv(4096)
+            connection.sendall(b"\r\n\r\n")
+            connection.close()
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(OSError, match="the painter refused: ''"):
+            SocketClient.open(f"http://127.0.0.1:{server.getsockname()[1]}/", "token")
 
 
 def ended_link(monkeypatch: pytest.MonkeyPatch, data: bytes) -> PainterLink:
@@ -253,3 +324,24 @@ def test_only_a_painter_of_this_machine_is_found_beside_a_shot(
 ) -> None:
     (tmp_path / "painter.json").write_text(json.dumps({"address": address, "token": token}))
     assert running_painter(tmp_path) == ((address, token) if is_taken else None)
+
+
+@pytest.mark.parametrize("damage", ["deep", "fifo", "large", "list"])
+def test_files_beside_a_shot_are_read_if_they_are_lightpaints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str
+) -> None:
+    folder = ShotFolder(tmp_path)
+    folder.render.write_bytes(b"")
+    folder.session.mkdir()
+    for path in (folder.looks, folder.record, folder.session / "painter.json"):
+        if damage == "fifo":
+            os.mkfifo(path)
+        else:
+            path.write_text({"deep": "[" * 10**5, "large": "[]", "list": "[[]]"}[damage])
+    if damage == "large":
+        monkeypatch.setattr(shot_files, "MAX_JSON_FILE", 1)
+    assert folder.read_looks() == []
+    assert folder.rendered_digest() == ""
+    assert running_painter(folder.session) is None
+    with pytest.raises(ValueError, match=r"\.json"):
+        read_factors(str(folder.looks))

@@ -183,7 +183,7 @@ class LiveSession:
                 found = json.loads(run.first_line)
                 checked_address(found["address"], found["token"])
                 self._link = PainterLink(found["address"], found["token"], PATIENCE_S)
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 self.end()
                 self.message = "this is not a painter of lightpaint: check the add-on's preferences"
             return True

@@ -14,6 +14,9 @@ import struct
 #: Relative distance below which two numbers of Blender, which have float32, are the same.
 FLOAT32_ROUNDING = 2.0**-22
 
+#: The largest multiplier that lightpaint finds, and the largest number of Blender.
+LARGEST_FACTOR, LARGEST_FLOAT32 = 1e30, (2 - 2.0**-23) * 2.0**127
+
 #: Working space, as files name it -> the matrix to it from linear Rec.709.
 SPACES = {
     "lin_ap1_scene": (
@@ -40,7 +43,8 @@ def scaled(base, factor, space=None, tint=None):
     mean = sum(factor) / 3
     if not all(map(math.isfinite, factor)) or mean <= 0:
         return [0.0, *colour]
-    return [level * mean, *(c / mean for c in multiplied(colour, factor, space, tint))]
+    made = multiplied(colour, factor, space, tint)
+    return [min(level * mean, LARGEST_FLOAT32), *(c / mean for c in made)]
 
 
 def scaled_colour(base, factor, space=None):
@@ -61,8 +65,8 @@ def checked_factor(values):
 
 
 def is_amount(value):
-    """Return whether a number is finite and not negative."""
-    return math.isfinite(value) and value >= 0
+    """Return whether a number is one that a light can be multiplied by."""
+    return 0 <= value <= LARGEST_FACTOR
 
 
 def are_equal(first, second):

@@ -19,7 +19,7 @@ def recall(owner):
     text = owner.get(MEMORY_KEY)
     try:
         memory = json.loads(text) if isinstance(text, str) else {}
-    except ValueError:  # somebody has edited it
+    except (ValueError, RecursionError):  # somebody has edited it
         return {}
     return memory if isinstance(memory, dict) else {}
 

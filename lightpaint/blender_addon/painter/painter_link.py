@@ -6,15 +6,16 @@ for it.
 """
 
 import base64
+import contextlib
 import hashlib
 import ipaddress
 import os
-import queue
 import re
 import socket
 import struct
 import threading
 import time
+from collections import deque
 from urllib.parse import urlsplit
 
 from .painter_messages import PROTOCOL_VERSION, from_bytes, to_bytes
@@ -37,8 +38,12 @@ _TOKEN, _PATH = re.compile(r"[A-Za-z0-9._~+/=-]+"), re.compile(r"[A-Za-z0-9._~/-
 _GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 _CONTINUATION, _BINARY, _CLOSE, _PING, _PONG = 0, 2, 8, 9, 10
 
-#: Messages that wait at most; of a painter that is much faster the oldest are dropped.
-MAX_WAITING = 256
+#: Messages that wait at most, and their bytes; of a painter that is much faster the oldest are
+#: dropped.
+MAX_WAITING, MAX_WAITING_BYTES = 256, 2**25
+
+#: Seconds in which a painter that is left takes the word for it.
+CLOSE_S = 0.2
 
 #: Seconds between two tries to connect.
 RETRY_S = 0.2
@@ -69,7 +74,8 @@ class SocketClient:
             head, unread = _read_head(connection)
             expected = base64.b64encode(hashlib.sha1((key + _GUID).encode()).digest()).decode()
             if not head.startswith("HTTP/1.1 101") or expected not in head:
-                raise ConnectionError(f"the painter refused: {head.splitlines()[0][:80]}")
+                first = head.partition("\r\n")[0][:80]
+                raise ConnectionError(f"the painter refused: {first!r}")
             connection.settimeout(None)
         except BaseException:
             connection.close()
@@ -107,12 +113,12 @@ class SocketClient:
                 return b"".join(parts)
 
     def close(self):
-        """End the connection, also for the thread that reads it."""
-        try:
+        """End the connection, also for the thread that reads it, and if nobody reads it there."""
+        with contextlib.suppress(OSError):
+            self._connection.settimeout(CLOSE_S)
             self._connection.sendall(client_frame(_CLOSE, struct.pack(">H", 1000)))
+        with contextlib.suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         self._connection.close()
 
     def _read_frame(self):
@@ -191,6 +197,29 @@ def _read_head(connection):
     return head.decode("latin-1"), unread
 
 
+class _Waiting:
+    """Messages that one thread adds and another takes, the oldest first."""
+
+    def __init__(self):
+        self._messages, self._bytes, self._lock = deque(), 0, threading.Lock()
+
+    def add(self, message, size):
+        """Add a message, of so many bytes, and drop the oldest ones beyond the bounds."""
+        with self._lock:
+            self._messages.append((message, size))
+            self._bytes += size
+            while len(self._messages) > 1 and (
+                len(self._messages) > MAX_WAITING or self._bytes > MAX_WAITING_BYTES
+            ):
+                self._bytes -= self._messages.popleft()[1]
+
+    def take(self):
+        """Return all that wait, of which none waits any more."""
+        with self._lock:
+            taken, self._messages, self._bytes = self._messages, deque(), 0
+        return [message for message, _ in taken]
+
+
 class PainterLink:
     """An observer of a painter. `messages` may be called from one thread only.
 
@@ -206,15 +235,14 @@ class PainterLink:
         self.is_connected = self.has_ended = False
         self.error = ""
         self._address, self._token, self._patience_s = address, token, patience_s
-        self._socket, self._queue = None, queue.Queue()
+        self._socket, self._waiting = None, _Waiting()
         self._is_over, self._is_closed = threading.Event(), False
         threading.Thread(target=self._run, name="lightpaint", daemon=True).start()
 
     def messages(self):
         """Return what has arrived since the last call, as pairs of JSON and buffers."""
-        was_over, arrived = self._is_over.is_set(), []
-        while not self._queue.empty():
-            arrived.append(self._queue.get())
+        was_over = self._is_over.is_set()
+        arrived = self._waiting.take()
         self.has_ended = was_over
         return arrived
 
@@ -230,9 +258,7 @@ class PainterLink:
             self._socket.send(to_bytes({"kind": "observe", "seq": 1, "version": PROTOCOL_VERSION}))
             self.is_connected = True
             while (frame := self._socket.receive()) is not None:
-                if self._queue.qsize() >= MAX_WAITING:
-                    self._queue.get()
-                self._queue.put(from_bytes(frame))
+                self._waiting.add(from_bytes(frame), len(frame))
         except (OSError, ValueError) as error:
             self.error = " ".join(str(error).split())
         finally:

@@ -14,6 +14,12 @@ PROTOCOL_VERSION = 3
 #: Largest side of an array in a message, as the painter has it.
 MAX_SIDE = 2**16
 
+#: Maximum size of the JSON of a message in bytes, whose values need thirty times as much memory.
+MAX_JSON = 2**24
+
+#: Maximum number of looks, and of characters of a sentence, that a panel can show.
+MAX_LOOKS, MAX_SENTENCE = 1000, 400
+
 #: Sentences while the lights change, and until the painter has sent how close they come.
 LIVE_TEXT, ANALYSING_TEXT = "the lamps follow the brush", "the lamps are set; analysing"
 
@@ -50,6 +56,8 @@ def from_bytes(frame):
 
 def _parsed(frame):
     (length,) = struct.unpack_from("<I", frame)
+    if length > MAX_JSON:
+        raise MessageError("a message that is longer than a painter's")
     if length > len(frame) - 4:
         raise MessageError("a frame that is shorter than its message")
     content = json.loads(frame[4 : 4 + length].decode(), parse_constant=_refuse)
@@ -138,16 +146,17 @@ class PainterState:
         elif kind == "looks":
             self._set_looks(content["looks"])
         elif kind == "notice":
-            self.notice = _text(content["text"])
+            self.notice = _sentence(content["text"])
         elif kind in ("closed", "failed"):
-            self.closing = self.notice = _text(content["text"])
+            self.closing = self.notice = _sentence(content["text"])
         elif kind == "waiting":
-            self.notice = _text(content["text"])
+            self.notice = _sentence(content["text"])
         elif kind == "progress":
-            self.progress = f"{content['task']}: {content['done']} of {content['total']}"
+            done = f"{content['task']}: {content['done']} of {content['total']}"
+            self.progress = _sentence(done)
         answer = content.get("answer", content)
         if isinstance(answer, dict) and answer.get("headline"):
-            self.headline = _text(answer["headline"])
+            self.headline = _sentence(answer["headline"])
         elif kind == "answer":
             self.headline = ANALYSING_TEXT if content.get("exact") else LIVE_TEXT
         if kind not in ("state", "answer"):
@@ -155,19 +164,16 @@ class PainterState:
         master = content.get("master")
         if master is not None and (type(master) not in (int, float) or not is_amount(master)):
             raise MessageError(f"the master dimmer is {str(master)[:40]}")
+        master = self.master if master is None else float(master)
         weights = buffers.get("weights", self._weights)
         if len(weights) != 3 * len(self.lights):
             raise MessageError(f"{len(weights)} weights for {len(self.lights)} lights")
-        each = [
-            checked_factor(self._shown(name, weights[3 * k : 3 * k + 3]))
+        factors = {
+            name: self._factor(name, weights[3 * k : 3 * k + 3], master)
             for k, name in enumerate(self.lights)
-        ]
-        self.is_exact = content.get("exact", True) is True
-        self.master = self.master if master is None else float(master)
-        self._weights = weights
-        self.factors = {
-            name: self._factor(name, weight) for name, weight in zip(self.lights, each, strict=True)
         }
+        self.is_exact = content.get("exact", True) is True
+        self.master, self._weights, self.factors = master, weights, factors
         self._set_drives(content.get("answer") or {} if kind == "state" else content)
         return True
 
@@ -184,22 +190,24 @@ class PainterState:
             for name, drives in self._undimmed.items()
         }
 
-    def _factor(self, name, weight):
+    def _factor(self, name, weight, master):
         """Return the multipliers of a light; the master dimmer leaves fixed lights as they are."""
-        level = 1.0 if self.is_fixed.get(name) else self.master
-        return tuple(level * value for value in weight)
+        level = 1.0 if self.is_fixed.get(name) else master
+        return checked_factor([level * value for value in self._shown(name, weight)])
 
     def _shown(self, name, weight):
         """Return a weight as a lamp here can have it: LEDs mix colours outside of Rec.709."""
         return [max(x, 0.0) for x in weight] if self._emitters.get(name) else weight
 
     def _set_looks(self, looks):
+        if len(looks) > MAX_LOOKS:
+            raise MessageError(f"{len(looks)} looks, more than {MAX_LOOKS}")
         self.looks = []
         for look in looks:
             pairs = zip(look["lights"], look["weights"], strict=True)
             weights = [self._shown(name, weight) for name, weight in pairs]
             factors = look_factors(look["lights"], weights)
-            self.looks.append(SessionLook(look["id"], _text(look["name"]), factors))
+            self.looks.append(SessionLook(look["id"], _sentence(look["name"]), factors))
 
 
 def _named_drives(emitters, values):
@@ -214,6 +222,12 @@ def look_factors(lights, weights):
     return {
         _text(name): checked_factor(weight) for name, weight in zip(lights, weights, strict=True)
     }
+
+
+def _sentence(value):
+    """Return a text as a panel can show it: one line that is not too long."""
+    shown = "".join(x if x.isprintable() else " " for x in _text(value)[: 2 * MAX_SENTENCE])
+    return " ".join(shown.split())[:MAX_SENTENCE]
 
 
 def _text(value):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """lightpaint as a program: where it is, and processes of it that Blender does not wait for."""
 
-import json
 import os
 import re
 import shutil
@@ -9,6 +8,7 @@ import subprocess
 import threading
 from pathlib import Path
 
+from ..shot.shot_files import read_json
 from .painter_link import checked_address, is_loopback
 
 #: How to install it, for messages.
@@ -139,12 +139,12 @@ def running_painter(session):
     says so.
     """
     try:
-        found = json.loads((Path(session) / "painter.json").read_text(encoding="utf-8"))
+        found = read_json(Path(session) / "painter.json")
         address, token = found["address"], found["token"]
         # The file may come from elsewhere, with the shot: it must not lead away from here.
         if is_loopback(checked_address(address, token).hostname):
             return address, token
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError):
         pass
     return None
 

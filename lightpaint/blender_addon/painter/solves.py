@@ -8,6 +8,7 @@ import time
 import traceback
 
 from ..lamps.lamp_units import checked_factor
+from ..shot.shot_files import read_json
 from .painter_link import SocketClient
 from .painter_messages import PROTOCOL_VERSION, PainterState, from_bytes, to_bytes
 from .program import ProgramRun
@@ -100,8 +101,7 @@ def solve_picture(program, shot, picture, folder, views):
 
 def read_factors(path):
     """Return the multipliers in a lighting.json. Raises OSError or ValueError."""
-    with open(path, encoding="utf-8") as file:
-        answer = json.load(file)
+    answer = read_json(path)
     try:
         return {name: checked_factor(x["weight"]) for name, x in answer["lights"].items()}
     except (KeyError, TypeError, AttributeError):

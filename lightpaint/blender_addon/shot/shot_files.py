@@ -13,6 +13,19 @@ from pathlib import Path
 
 from ..lamps.lamp_units import checked_factor
 
+#: Maximum size of a file with JSON in bytes.
+MAX_JSON_FILE = 2**26
+
+
+def read_json(path):
+    """Return what a file with JSON has. Raises OSError or ValueError, also for what is no file."""
+    if not os.path.isfile(path) or os.path.getsize(path) > MAX_JSON_FILE:
+        raise ValueError(f"{path} is not a file that lightpaint has written")
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path} is nested too deeply") from None
+
 
 class ShotFolder:
     """A folder with the files of one shot."""
@@ -39,11 +52,11 @@ class ShotFolder:
     def rendered_digest(self):
         """Return the digest of the scene that the render shows; "" without a whole render."""
         try:
-            record = json.loads(self.record.read_text(encoding="utf-8"))
+            record = read_json(self.record)
             is_whole = self.render.stat().st_size == record["bytes"]
         except (OSError, ValueError, KeyError, TypeError):
             return ""
-        return record.get("digest", "") if is_whole else ""
+        return str(record.get("digest", "")) if is_whole else ""
 
     def finish_render(self, digest, groups):
         """Give the written render its name, and record what it shows."""
@@ -54,7 +67,7 @@ class ShotFolder:
     def read_looks(self):
         """Return kept looks as (name, multipliers by group); none if there are none."""
         try:
-            looks = json.loads(self.looks.read_text(encoding="utf-8"))
+            looks = read_json(self.looks)
             return [
                 (str(x["name"]), {k: checked_factor(v) for k, v in x["factors"].items()})
                 for x in looks
