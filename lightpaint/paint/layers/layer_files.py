@@ -47,8 +47,9 @@ _Plane = npt.NDArray[np.float32]
 #: Number of bytes that tell the kind of a file.
 HEAD_BYTES = 128
 
-#: Most pixels that the layers of a file may cover together: 16 bytes each stay in memory.
-MAX_KEPT_PIXELS = 2**27
+#: Most pixels that the layers of a file may cover together: while the painter takes them in, each
+#: needs some 60 bytes.
+MAX_KEPT_PIXELS = 2**26
 
 _Channels = Mapping[str, npt.NDArray[Any]]
 
