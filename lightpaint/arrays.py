@@ -40,8 +40,17 @@ ALIGNMENT = 64
 _MAGNITUDE, _INFINITY, _LEAST_NORMAL = map(np.uint32, (2**31 - 1, 255 << 23, 113 << 23))
 
 #: Bits of a half float that is infinite, and of one that is not a number.
-_HALF_INFINITY = np.uint16(0x7C00)
+_HALF_INFINITY, _HALF_SIGN = np.uint16(0x7C00), np.uint16(0x8000)
 _HALF_NAN = np.uint32(0x7E00)
+
+#: Of a half float whose digits are shifted to those of float32: its sign and digits, and the ratio
+#: of what its exponent means there and here.
+_SIGN_AND_DIGITS = np.uint32(0x8FFFE000).view(np.int32)
+_RAISED_EXPONENT = np.float32(2.0**112)
+
+#: Half floats that are converted at a time, the number up to which they are looked up, and a
+#: subnormal float32.
+_NUMBERS_AT_A_TIME, _FEW_NUMBERS, _SUBNORMAL = 2**16, 2**11, np.float32(2.0**-136)
 
 
 def largest(image: Floats) -> Floats:
@@ -106,13 +115,44 @@ def aligned(values: npt.ArrayLike, kind: type[_Kind]) -> npt.NDArray[_Kind]:
 def copy_as_singles(values: npt.NDArray[Any], into: npt.NDArray[np.float32]) -> None:
     """Copy numbers into an array of float32 of the same shape.
 
-    Half floats are looked up: NumPy converts them at half the speed, and at a tenth of it where
-    they are subnormal, as most noise is.
+    Many half floats are shifted to where float32 has its digits, and multiplied by the ratio of the
+    two scales of exponents; others are looked up, in twice the time. NumPy takes four times as
+    long, and twenty times where they are subnormal, as most noise is.
     """
-    if values.dtype == np.float16 and values.dtype.isnative:
-        np.take(_singles(), np.ascontiguousarray(values).view(np.uint16), out=into, mode="clip")
-    else:
+    if values.dtype != np.float16 or not values.dtype.isnative:
         into[...] = values
+        return
+    bits = np.ascontiguousarray(values).view(np.uint16)
+    if bits.size < _FEW_NUMBERS or not into.flags.c_contiguous or _flushes_subnormals():
+        np.take(_singles(), bits, out=into, mode="clip")
+        return
+    bits, flat = bits.reshape(-1), into.reshape(-1)
+    for start in range(0, bits.size, _NUMBERS_AT_A_TIME):
+        part = slice(start, start + _NUMBERS_AT_A_TIME)
+        if _are_finite(bits[part]):
+            _shift_to_singles(bits[part], flat[part])
+        else:
+            np.take(_singles(), bits[part], out=flat[part], mode="clip")
+
+
+def _are_finite(bits: npt.NDArray[np.uint16]) -> bool:
+    """Return whether half floats, given as their bits, are finite: positive ones, and others."""
+    largest_positive, largest_negative = bits.view(np.int16).max(), bits.max() & ~_HALF_SIGN
+    return bool(max(largest_positive, largest_negative) < _HALF_INFINITY)
+
+
+def _shift_to_singles(bits: npt.NDArray[np.uint16], into: npt.NDArray[np.float32]) -> None:
+    """Convert finite half floats, given as their bits, (n,), to float32, (n,)."""
+    digits = into.view(np.int32)
+    digits[...] = bits.view(np.int16)  # the sign is repeated to the left
+    digits <<= np.int32(13)
+    digits &= _SIGN_AND_DIGITS
+    into *= _RAISED_EXPONENT
+
+
+def _flushes_subnormals() -> bool:
+    """Return whether this thread takes subnormal numbers for 0, as libraries may make it do."""
+    return not (_SUBNORMAL * _RAISED_EXPONENT).item()
 
 
 def is_finite(values: npt.NDArray[Any]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.arrays import round_to_halves
+from lightpaint.arrays import as_singles, copy_as_singles, round_to_halves
 from lightpaint.basis.file import basis_file, file_parts, half_floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file.file_parts import SCALE_KEY
@@ -67,6 +67,22 @@ def test_rounding_has_the_bits_of_numpy() -> None:
             halves[is_number].view(np.uint16), expected[is_number].view(np.uint16)
         )
         assert np.isnan(halves[~is_number]).all()
+
+
+@pytest.mark.parametrize("flushes", [False, True])
+def test_half_floats_are_converted_with_the_bits_of_numpy(
+    flushes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of all half floats, several pieces and few of them; into arrays of either order."""
+    monkeypatch.setattr("lightpaint.arrays._flushes_subnormals", lambda: flushes)
+    every = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    finite = every[np.isfinite(every)]
+    for halves in (every, finite[::-1], np.tile(finite, 3), finite[:7], finite[:0]):
+        expected = halves.astype(np.float32).view(np.uint32)
+        np.testing.assert_array_equal(as_singles(halves).view(np.uint32), expected)
+        columns = np.empty((halves.size, 3), np.float32)
+        copy_as_singles(halves, columns[:, 1])
+        np.testing.assert_array_equal(columns[:, 1].view(np.uint32), expected)
 
 
 def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:
