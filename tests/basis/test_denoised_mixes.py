@@ -146,8 +146,9 @@ def test_without_a_denoiser_light_is_averaged_along_surfaces(
     assert error["along surfaces"] < 0.06 * raw
 
 
-def test_direct_light_of_reduced_pictures_is_averaged_along_surfaces(
-    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("factor", [1, 2])
+def test_direct_light_is_averaged_along_surfaces(
+    factor: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ):
     """The denoiser, which takes ten times as long, gets indirect light alone."""
     denoised_parts = []
@@ -168,17 +169,18 @@ def test_direct_light_of_reduced_pictures_is_averaged_along_surfaces(
         planes=as_planes(plain.planes.array() + (grain[0] + grain[1]) / 2),
         noise=as_planes(plain.noise.array() + (grain[0] - grain[1]) / 2),
     )
-    clean = denoise_plane(basis, 0, factor=2)
+    clean = denoise_plane(basis, 0, factor=factor)
     [indirect] = denoised_parts
     assert basis.indirect is not None
-    np.testing.assert_array_equal(indirect, block_mean(basis.indirect.planes.plane(0), 2))
-    direct, truth = clean - indirect.mean(dtype=np.float64), block_mean(pool, 2)
-    raw = block_mean(np.maximum(basis.planes.plane(0) - basis.indirect.planes.plane(0), 0), 2)
+    np.testing.assert_array_equal(indirect, block_mean(basis.indirect.planes.plane(0), factor))
+    direct, truth = clean - indirect.mean(dtype=np.float64), block_mean(pool, factor)
+    raw = block_mean(np.maximum(basis.planes.plane(0) - basis.indirect.planes.plane(0), 0), factor)
     error, noise = (np.square(picture - truth).mean(axis=(0, 2)) for picture in (direct, raw))
     # A Gaussian of two pixels leaves 1/25 of the noise. Beside the edge, which it would blur by
     # half of 0.2, the picture stays as it is, with noise of four standard errors at most.
     assert error[:8].mean() < 0.1 * noise.mean()
-    assert np.abs(direct - truth)[:, edge // 2 - 1 : edge // 2 + 1].max() < 4 * 0.02 / np.sqrt(8)
+    beside = np.abs(direct - truth)[:, edge // factor - 1 : edge // factor + 1]
+    assert beside.max() < 4 * 0.02 / np.sqrt(2 * factor**2)
 
 
 def two_lights(rng: np.random.Generator) -> tuple[Basis, list[np.ndarray]]:
