@@ -106,6 +106,61 @@ def test_no_round_breaks_a_requirement(make_basis: Any, space: Any) -> None:
     assert losses[-1] < losses[0]
 
 
+def _expect_kept_picture(live: LiveSolver, answer: Any, rounds: int) -> None:
+    """Expect the picture of an answer, carried over so many rounds, to be the sum of all lights."""
+    kept = live._many._pictures[answer.tobytes()]
+    assert live._many._rows is not None
+    expected = np.einsum("cnp,nc->cp", live._many._rows, answer)
+    # Each round adds the roundings of weights and of a sum in float32.
+    np.testing.assert_allclose(kept, expected, rtol=rounds * 2.0**-21)
+
+
+@pytest.mark.usefixtures("moves_some")
+def test_a_picture_is_carried_from_round_to_round(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(many_lights, "ROUNDS_PER_SUM", 8)
+    picture_of, sums = many_lights._picture, []
+
+    def counted(rows: Any, weights: Any) -> Any:
+        sums.append(weights)
+        return picture_of(rows, weights)
+
+    monkeypatch.setattr(many_lights, "_picture", counted)
+    live, _, problem = _painted(make_basis, Fit(space="display", hold=1.0))
+    answer, [view], carried = problem.basis.current_weights, live._views, 0
+    for k in range(30):
+        region = slice(5 + k % 20, 10 + k % 20), slice(4, 20)
+        view._image[region] *= 1 + 0.3 * (-1) ** k
+        view.update(region)
+        answer = live.answer(answer, while_painting=True)
+        if answer.tobytes() in live._many._pictures:
+            _expect_kept_picture(live, answer, 8)
+            carried += 1
+    assert carried > 20
+    assert 3 < len(sums) < 12  # the first, the current lights', and one after eight rounds
+
+
+@pytest.mark.usefixtures("moves_some")
+def test_a_view_that_is_painted_later_has_a_picture_of_its_own(make_basis: Any) -> None:
+    """The weights that a round begins with are the same; the pictures have more pixels."""
+    basis = _basis(make_basis)
+    views = [
+        LiveView(basis, basis.current_look.copy(), np.zeros(SIZE, np.float32)) for _ in range(2)
+    ]
+    fit = _painted(make_basis, Fit(space="display", hold=1.0))[2].fit
+    live, answer = LiveSolver(views, fit=fit, constraints=Constraints()), basis.current_weights
+    for view in views:
+        region = slice(5, 18), slice(4, 20)
+        view._image[region] *= 2
+        view._importance[region] = 1
+        view.update(region)
+        answer = live.answer(answer)
+    assert live._many._rows is not None
+    assert live._many._rows.shape[2] == 2 * views[0].film(None).rows.shape[2]
+    _expect_kept_picture(live, answer, 1)
+
+
 @pytest.mark.usefixtures("moves_some")
 def test_a_round_moves_only_some_lights_and_other_rounds_the_others(make_basis: Any) -> None:
     live, _, problem = _painted(make_basis, Fit(space="display", hold=1.0))

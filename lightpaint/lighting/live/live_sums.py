@@ -10,6 +10,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.basis import Basis, Planes, array_name, array_once
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
+from lightpaint.lighting.live.step_search import search_step
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import (
     ON_EMITTERS,
@@ -39,13 +40,6 @@ LayerWishes = Callable[[int], Sequence[Wish]]
 
 #: Returns where brighter than the painting is as good, (h, w, 3); None for nowhere.
 AtLeast = Callable[[], Bools | None]
-
-#: Shares of a step to try in display space. An answer is one step from the last one.
-STEP_SHARES = (1.0, 0.5, 0.25)
-
-#: Share of the fall that squares predict from which no shorter step is tried: half a step would
-#: bring that much of it.
-GOOD_FALL = 0.75
 
 #: Number of lightings whose pictures are kept: from one answer to the next, the last ones and the
 #: current lighting stay the same.
@@ -436,10 +430,8 @@ class Films:
         """Improve weights (n, 3) by one round of reweighting; the loss is the loss of the best
         start, or less.
 
-        The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a
-        few times only, as long as a shorter one lowers the loss, unless the whole step brings most
-        of what its squares promise. project: moves weights between two allowed ones onto the
-        constraints.
+        The round is one of `reweighting.rounds`, but in float32, and with the step of
+        `search_step`. project: moves weights between two allowed ones onto the constraints.
         """
 
         def missed(w: Doubles) -> float:
@@ -450,20 +442,16 @@ class Films:
         k = int(np.argmin(values))
         start, value = starts[k], values[k]
         equations = self._equations(pixels, self._shown(start, pixels)[0])
-        best_weights, nearest = best(equations, start), start
+        best_weights = best(equations, start)
         pulled = equations if pull is None else equations + pull
         promised = float((pulled.objective(start) - pulled.objective(best_weights)).sum())
-        for part in STEP_SHARES:
-            step = project(interpolate(start, best_weights, part))
-            reached = missed(step)
-            if reached > value and nearest is not start:
-                break
-            is_good = part == 1 and value - reached >= GOOD_FALL * promised
-            if reached <= value:
-                nearest, value = step, reached
-            if is_good:
-                break
-        return nearest
+        return search_step(
+            start,
+            value,
+            lambda share: project(interpolate(start, best_weights, share)),
+            missed,
+            promised=promised,
+        )
 
     def _equations(self, pixels: PaintedPixels, picture: Doubles) -> NormalEquations:
         """Return the linear problem of the squares at a picture, (3, p), summed in float32."""

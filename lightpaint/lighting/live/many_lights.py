@@ -19,11 +19,12 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.lighting.constraints.constraint_table import Requirements
+from lightpaint.lighting.live.step_search import search_step
 from lightpaint.lighting.loss.painting_loss import PaintedPixels
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
-from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.threads import one_thread, parallel_map
@@ -41,8 +42,9 @@ MAX_FILM_VALUES = 2**22
 #: Pixels whose squares are summed for the curvature of each light: one run of several.
 CURVATURE_RUN, CURVATURE_STEP = 16, 8
 
-#: Shares of a step to try. A round is one step from the last answer.
-STEP_SHARES = (1.0, 0.5, 0.25)
+#: Rounds whose pictures are found from one another, until all lights are added up again: round-off
+#: grows.
+ROUNDS_PER_SUM = 64
 
 #: Solves equations of the lights of a reduction from weights (m, 3); returns the reduction with
 #: which to go on, and the weights.
@@ -119,12 +121,14 @@ class SomeLights:
 
     def put_back(self, part: Reduction) -> Reduction:
         """Return the reduction of all lights with the knobs of `part`, one of these lights."""
-        if all(a is b for a, b in zip(part.knobs, self.reduction.knobs, strict=True)):
+        own = self.reduction.knobs
+        changed = [j for j, knob in enumerate(part.knobs) if knob is not own[j]]
+        if not changed:
             return self.whole
         number = dict(enumerate(self.lights.tolist()))
         knobs = [*self.whole.knobs]
-        for k, knob in zip(self.places, part.knobs, strict=True):
-            knobs[k] = _renumbered(knob, number)
+        for j in changed:
+            knobs[self.places[j]] = _renumbered(part.knobs[j], number)
         return replace(self.whole, knobs=tuple(knobs))
 
     def part_of(self, equations: NormalEquations) -> NormalEquations:
@@ -153,7 +157,7 @@ def equations_about(
 def _renumbered(knob: Knob, number: dict[int, int]) -> Knob:
     """Return a knob whose lights have other numbers."""
     unknowns = tuple(
-        replace(x, columns=tuple((number[light], rgb) for light, rgb in x.columns))
+        Unknown(tuple((number[light], rgb) for light, rgb in x.columns), x.lower, x.upper)
         for x in knob.unknowns
     )
     return replace(knob, lights=tuple(number[light] for light in knob.lights), unknowns=unknowns)
@@ -167,7 +171,13 @@ class ManyLights:
         # as long as its gradient stays the same, at a bound or not.
         self._settled = np.zeros((count, 3))
         self._has_moved = np.zeros(count, bool)
-        self._pictures: dict[bytes, Doubles] = {}  # of the starts of the last round
+        # A picture reads all rows, and the gradient of the pull all its squares: those of the
+        # starts of the last round are kept, and the picture that it came to.
+        self._rows: Floats | None = None
+        self._pictures: dict[bytes, Doubles] = {}
+        self._rounds = 0  # since a picture was the sum of all lights
+        self._pull: NormalEquations | None = None
+        self._pull_gradients: dict[bytes, Doubles] = {}
         self._squares: tuple[Floats, Floats] | None = None  # of some pixels of some rows
 
     def order(self, weights: Doubles, gradient: Doubles, curvature: Doubles) -> Indices:
@@ -222,28 +232,41 @@ class ManyLights:
             squares = squares + part_of_pull
         equations = equations_about(squares, start[lights], gradient[lights])
         part, best = solve(equations, some.reduction_beside(start), start[lights])
-        self.settle(lights, equations.gradient(best))
+        gradient_at_best = equations.gradient(best)
+        self.settle(lights, gradient_at_best)
+        pictures: dict[bytes, Doubles] = {}
 
-        def loss_at(step: Doubles) -> float:  # beyond the pull on the start
+        def step_of(share: float) -> Doubles:
+            step = start.copy()
+            step[lights] = project(part, interpolate(start[lights], best, share))
+            return step
+
+        def loss(step: Doubles) -> float:  # beyond the pull on the start
             change = (step - start)[lights]
-            lit = np.matmul(_f32(change).T[:, None], own)[:, 0]
-            total = float(pixels.objective(picture + lit).sum())
+            lit = picture + np.matmul(_f32(change).T[:, None], own)[:, 0]
+            pictures[step.tobytes()] = lit
+            total = float(pixels.objective(lit).sum())
             if part_of_pull is None:
                 return total
             about = equations_about(part_of_pull, np.zeros_like(change), pull_gradient[lights])
             return total + float((change * (about.gradient(change) - about.b.T)).sum())
 
-        nearest = start
-        for share in STEP_SHARES:
-            step = start.copy()
-            step[lights] = interpolate(start[lights], best, share)
-            step[lights] = project(part, step[lights])
-            reached = loss_at(step)
-            if reached > value and nearest is not start:
-                break
-            if reached <= value:
-                nearest, value = step, reached
+        # Of a quadratic, the mean of the gradients at both ends.
+        fall = (start[lights] - best) * (gradient[lights] + gradient_at_best)
+        nearest = search_step(start, value, step_of, loss, promised=float(fall.sum()))
+        if nearest is not start:
+            self._keep_picture(key := nearest.tobytes(), pictures[key])
         return some.put_back(part), nearest
+
+    def _keep_picture(self, key: bytes, picture: Doubles) -> None:
+        """Keep the picture (3, p) that a round came to, unless many rounds have added to its
+        round-off. key: the bytes of its weights.
+        """
+        self._rounds += 1
+        if self._rounds < ROUNDS_PER_SUM:
+            self._pictures[key] = picture
+        else:
+            self._rounds = 0
 
     def _best_start(
         self,
@@ -255,21 +278,26 @@ class ManyLights:
         """Return the start (n, 3) with the least loss, its picture (3, p), the loss of that picture
         without the pull, and half the gradient of the pull there, (n, 3).
         """
-        pictures = {start.tobytes(): start for start in starts}
+        if self._rows is not rows:
+            self._rows, self._pictures = rows, {}
+        if self._pull is not pull:
+            self._pull, self._pull_gradients = pull, {}
+        keyed = {start.tobytes(): start for start in starts}
         self._pictures = {
             key: self._pictures[key] if key in self._pictures else _picture(rows, start)
-            for key, start in pictures.items()
+            for key, start in keyed.items()
+        }
+        self._pull_gradients = {
+            key: self._pull_gradients[key] if key in self._pull_gradients else pull.gradient(start)
+            for key, start in keyed.items()
+            if pull is not None
         }
         found = []
-        for start in starts:
-            picture = self._pictures[start.tobytes()]
-            value, gradient, pulled = (
-                float(pixels.objective(picture).sum()),
-                np.zeros_like(start),
-                0.0,
-            )
+        for key, start in keyed.items():
+            picture, gradient, pulled = self._pictures[key], np.zeros_like(start), 0.0
+            value = float(pixels.objective(picture).sum())
             if pull is not None:
-                gradient = pull.gradient(start)
+                gradient = self._pull_gradients[key]
                 # wᵀMw − 2 bᵀw, of which the gradient Mw − b has the first half.
                 pulled = float((start * (gradient - pull.b.T)).sum())
             found.append((value + pulled, start, picture, value, gradient))
