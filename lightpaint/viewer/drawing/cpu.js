@@ -55,20 +55,20 @@ export class CpuView {
 
   /** @param {number} count */
   setCount(count) {
-    this.planes = Array.from({ length: count }, () => ({ halves: null, scale: 1 }));
+    this.planes = Array.from({ length: count }, () => ({ halves: null, scale: 1, step: 1 }));
     for (const mix of Object.values(this.mixes)) {
       mix.weights = new Float64Array(3 * count);
       mix.invalidate();
     }
   }
 
-  /** @param {number} light @param {Uint16Array} halves @param {number} scale */
-  setPlane(light, halves, scale) {
-    if (halves.length !== this.planeSize[0] * this.planeSize[1] * 3)
-      throw new Error(
-        `a plane of ${halves.length} numbers on a picture of ${this.planeSize.join(' × ')}`,
-      );
-    this.planes[light] = { halves: replaceNonFinite(halves), scale };
+  /** @param {number} light @param {Uint16Array} halves @param {number} scale
+   * @param {number} [step] */
+  setPlane(light, halves, scale, step = 1) {
+    const [rows, columns] = this.planeSize.map((n) => Math.ceil(n / step));
+    if (halves.length !== rows * columns * 3)
+      throw new Error(`a plane of ${halves.length} numbers on a picture of ${rows} × ${columns}`);
+    this.planes[light] = { halves: replaceNonFinite(halves), scale, step };
     for (const mix of Object.values(this.mixes)) mix.invalidate();
   }
 
@@ -169,8 +169,9 @@ export class CpuView {
   updateMixLayer(kind, params) {
     const mix = this.mixes[kind];
     const startTime = performance.now();
-    const isOther = mix.update(this.planes, this.step, params.live);
-    const layer = this.layer(kind, this.step);
+    const step = mix.stepFor(this.planes, this.step);
+    const isOther = mix.update(this.planes, step, params.live);
+    const layer = this.layer(kind, step);
     if (isOther) layer.setLight(mix.light);
     const overlay = kind === 'solution' ? params.overlay : falseColourOnly(params);
     // The difference depends on the painting, too.
@@ -178,13 +179,13 @@ export class CpuView {
     const painting = overlay === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
     layer.show(this.lut, params.stops, overlay === 'importance' ? null : overlay, (rgba) => {
-      const grid = { ...this.grid(this.step), shown: [layer.height, layer.width] };
+      const grid = { ...this.grid(step), shown: [layer.height, layer.width] };
       if (overlay === 'falsecolor') drawFalseColour(rgba, layer.light, 2 ** params.stops);
       else if (overlay === 'beyond' && beyond)
         drawInk(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
       else if (painting) drawMissed(rgba, painting, this.importance, grid);
     });
-    if (isOther) this.mixMs = (performance.now() - startTime) * this.step ** 2;
+    if (isOther) this.mixMs = (performance.now() - startTime) * step ** 2;
     return layer;
   }
 
@@ -219,8 +220,9 @@ export class CpuView {
   planesAt(x, y) {
     const values = new Float32Array(3 * this.planes.length);
     const [row, column] = [y, x].map((at, i) => Math.floor((at * this.planeSize[i]) / this.size[i]));
-    const start = 3 * (row * this.planeSize[1] + column);
-    this.planes.forEach(({ halves, scale }, k) => {
+    this.planes.forEach(({ halves, scale, step }, k) => {
+      const inRow = Math.ceil(this.planeSize[1] / step);
+      const start = 3 * (Math.floor(row / step) * inRow + Math.floor(column / step));
       for (let c = 0; halves && c < 3; c++) values[3 * k + c] = VALUES[halves[start + c]] * scale;
     });
     return values;

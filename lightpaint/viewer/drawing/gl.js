@@ -6,6 +6,7 @@
  */
 import { mixPlanes } from './cpu.js';
 import { Planes } from './gpu.js';
+import { repeatPixels } from './half_floats.js';
 import { Textures } from './textures.js';
 import { SRGB } from './view_transform.js';
 import { maxImportance } from './overlay.js';
@@ -107,9 +108,10 @@ export class GlView {
     this.planes.setCount(count);
   }
 
-  /** @param {number} light @param {Uint16Array} halves @param {number} scale */
-  setPlane(light, halves, scale) {
-    this.planes.setPlane(light, halves, scale);
+  /** @param {number} light @param {Uint16Array} halves @param {number} scale
+   * @param {number} [step] */
+  setPlane(light, halves, scale, step = 1) {
+    this.planes.setPlane(light, repeatPixels(halves, step, this.planeSize), scale);
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */

@@ -1,12 +1,13 @@
 /** Sums of weighted planes, Σ weights[k] · plane[k], without a GPU. */
 import { VALUES } from './half_floats.js';
 
-/** @typedef {{halves: Uint16Array | null, scale: number}} Plane (h, w, 3), light at unit emission
- *   over scale */
+/** step: between the pixels and rows that halves hold.
+ * @typedef {{halves: Uint16Array | null, scale: number, step: number}} Plane (h, w, 3), light at
+ *   unit emission over scale */
 
 /**
- * The mix of planes with weights, at every pixel or at every second pixel of every second row. If
- * possible, an update adds only planes whose weights have changed.
+ * The mix of planes with weights, at every step-th pixel of every step-th row. If possible, an update
+ * adds only planes whose weights have changed.
  */
 export class Mix {
   /** @param {[height: number, width: number]} size */
@@ -31,13 +32,23 @@ export class Mix {
     return this.step === 1 ? this.fullLight : this.halfLight;
   }
 
+  /** Return the least step, a multiple of the steps of all planes that shine, of at least `step`.
+   * @param {Plane[]} planes @param {number} step */
+  stepFor(planes, step) {
+    const { weights } = this;
+    const isOn = (/** @type {number} */ k) =>
+      weights[3 * k] || weights[3 * k + 1] || weights[3 * k + 2];
+    const own = planes.reduce((most, plane, k) => (isOn(k) ? Math.max(most, plane.step) : most), 1);
+    return own * Math.ceil(step / own);
+  }
+
   /** Note that planes have changed. */
   invalidate() {
     this.appliedWeights = null;
   }
 
   /** Update the mix. live: whether to update sums incrementally, which accumulates round-off.
-   * @param {Plane[]} planes @param {number} step 1 or 2 @param {boolean} live
+   * @param {Plane[]} planes @param {number} step as `stepFor` returns it @param {boolean} live
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
     const weights = this.weights;
@@ -74,9 +85,9 @@ export class Mix {
     if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
     const terms = [];
     for (const k of indices) {
-      const { halves, scale } = planes[k];
+      const { halves, scale, step } = planes[k];
       const [r, g, b] = [0, 1, 2].map((c) => weights[3 * k + c] * scale);
-      if (halves && (r || g || b)) terms.push({ halves, weights: [r, g, b] });
+      if (halves && (r || g || b)) terms.push({ halves, step, weights: [r, g, b] });
     }
     addPlanes(this[name], terms, this.size[1], width, this.step, startsFromBlack);
   }
@@ -86,21 +97,24 @@ export class Mix {
   }
 }
 
-/** @typedef {{halves: Uint16Array, weights: number[]}} Term */
+/** @typedef {{halves: Uint16Array, step: number, weights: number[]}} Term */
 
-/** Add planes to light, four at a time.
+/** Add planes to light, those of all pixels four at a time.
  * @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth width of the planes
  * @param {number} width of the light @param {number} step @param {boolean} startsFromBlack whether light
  * starts from black */
 function addPlanes(light, terms, planeWidth, width, step, startsFromBlack) {
   let isFresh = startsFromBlack;
+  const whole = terms.filter((term) => term.step === 1);
   let next = 0;
-  for (; next + 4 <= terms.length; next += 4) {
-    addFour(light, terms.slice(next, next + 4), planeWidth, width, step, isFresh);
+  for (; next + 4 <= whole.length; next += 4) {
+    addFour(light, whole.slice(next, next + 4), planeWidth, width, step, isFresh);
     isFresh = false;
   }
   if (isFresh) light.fill(0);
-  for (; next < terms.length; next++) addOne(light, terms[next], planeWidth, width, step);
+  const others = [...whole.slice(next), ...terms.filter((term) => term.step > 1)];
+  for (const term of others)
+    addOne(light, term, Math.ceil(planeWidth / term.step), width, step / term.step);
 }
 
 /** @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth

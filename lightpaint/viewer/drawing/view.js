@@ -51,8 +51,9 @@ export const DEFAULTS = Object.freeze({
  * @property {'gl' | 'cpu'} name
  * @property {HTMLCanvasElement} canvas whose width and height are device pixels
  * @property {(count: number) => void} setCount how many lights there are; their planes are black
- * @property {(light: number, halves: Uint16Array, scale: number) => void} setPlane
- *   (h, w, 3) halves of the light at unit emission, times `scale`. The view may keep the array.
+ * @property {(light: number, halves: Uint16Array, scale: number, step?: number) => void} setPlane
+ *   (h, w, 3) halves of the light at unit emission, times `scale`; of every step-th pixel of every
+ *   step-th row. The view may keep the array.
  * @property {(weights: ArrayLike<number>, kind?: 'solution' | 'other') => void} setWeights
  *   (n, 3), row by row
  * @property {(region: Region, image: Float32Array, importance: Float32Array) => void} setCanvas

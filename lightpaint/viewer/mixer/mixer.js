@@ -27,7 +27,7 @@ class Mixer {
    * @param {import("../drawing/view_transform.js").Lut} lut */
   constructor(root, [data, planes, gels], lut) {
     this.data = data;
-    this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale }));
+    this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale, step: 1 }));
     this.encoder = new Encoder(lut, data.transform.stops);
     this.lut = lut;
     this.mix = new Mix(data.size);

@@ -25,9 +25,9 @@ def test_drafts_become_coarser_until_ten_answers_a_second_come(page: Any):
 def test_a_draft_repeats_its_pixels(page: Any):
     whole = page.evaluate(
         """async () => {
-          const { repeatPixels } = await import('/engine/message_frames.js');
-          const data = Uint16Array.from({ length: 18 }, (_, k) => k);
-          return [...repeatPixels({ data }, 2, [3, 5])];
+          const { repeatPixels } = await import('/viewer/drawing/half_floats.js');
+          const halves = Uint16Array.from({ length: 18 }, (_, k) => k);
+          return [...repeatPixels(halves, 2, [3, 5])];
         }"""
     )
     row = [[0, 1, 2], [0, 1, 2], [3, 4, 5], [3, 4, 5], [6, 7, 8]]

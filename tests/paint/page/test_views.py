@@ -240,6 +240,49 @@ def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
     assert step == 1
 
 
+def test_a_draft_of_every_second_pixel_is_mixed_as_it_is(page: Any, pictures: Any):
+    """Beside planes of all pixels, of which every second counts then; until a whole one comes."""
+    draw_panes(page, "cpu", pictures)
+    steps, light = page.evaluate(
+        """async ([width, height, scale]) => {
+            const { data } = await bench.array("plane/1");
+            const draft = [];
+            for (let y = 0; y < height; y += 2)
+              for (let x = 0; x < width; x += 2)
+                draft.push(...data.slice(3 * (y * width + x), 3 * (y * width + x + 1)));
+            view.setPlane(1, Uint16Array.from(draft), scale, 2);
+            bench.shown({});
+            const { step, light } = view.mixes.solution;
+            const [shown, steps] = [Array.from(light), [step]];
+            view.setPlane(1, data, scale);
+            bench.shown({});
+            steps.push(view.mixes.solution.step);
+            return [steps, shown];
+        }""",
+        [W, H, pictures["scales"][1]],
+    )
+    assert steps == [2, 1]
+    half = np.reshape(light, ((H + 1) // 2, W // 2, 3))
+    np.testing.assert_allclose(half, mix_planes(pictures)[::2, ::2], rtol=1e-5)  # float32
+
+
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_a_draft_stands_for_the_pixels_around_its_own(page: Any, pictures: Any, kind: str):
+    draw_panes(page, kind, pictures)
+    light = page.evaluate(
+        """([width, height]) => {
+            const [rows, columns] = [height, width].map((n) => Math.ceil(n / 2));
+            const halves = new Uint16Array(3 * rows * columns);
+            halves.fill(0x3c00, 3 * columns, 6 * columns); // the second row of the draft is 1
+            view.setPlane(2, halves, 4, 2);
+            bench.shown({});
+            return [1, 2, 3, 4].map((y) => view.planesAt(width - 1, y)[3 * 2]);
+        }""",
+        [W, H],
+    )
+    assert light == [0, 4, 4, 0]
+
+
 @pytest.mark.parametrize("kind", [nightly("cpu"), "gl"])
 def test_bright_halves_spread_nothing(page: Any, site: Any, pictures: Any, kind: str):
     plane = site.arrays["plane/0"].copy()

@@ -1,5 +1,5 @@
 /** Drafts of the pictures of dragged lights, which wait for their answer to be drawn with it. */
-import { repeatPixels } from './message_frames.js';
+import { repeatPixels } from '../../../viewer/drawing/half_floats.js';
 
 /** @typedef {import("./message_frames.js").Picture} Picture */
 /** @typedef {import("./picture_loader.js").PictureLoader} PictureLoader */
@@ -21,7 +21,8 @@ export class LightDrafts {
     const slot = `plane ${light}`;
     const name = this.loader.notePicture(slot, resources);
     if (name === null) return;
-    const data = repeatPixels(arrays.data, step, size);
+    const halves = /** @type {Uint16Array} */ (arrays.data.data);
+    const data = repeatPixels(halves, step, size);
     this.waiting.set(slot, { name, picture: { ...arrays.data, data } });
   }
 

@@ -128,11 +128,15 @@ export function PointerStatus({ ui }) {
 function sharesByName(ui, shares) {
   /** @type {Map<unknown, {key: string, name: string, share: number}>} */
   const sums = new Map();
+  const { images, lights } = ui;
   shares.forEach((share, k) => {
-    const image = imageOf(ui.images, k);
-    const name = image?.name ?? ui.lights[k]?.label ?? '';
-    const sum = sums.get(image ?? k) ?? { key: image ? `image ${name}` : `${k}`, name, share: 0 };
-    sums.set(image ?? k, { ...sum, share: sum.share + share });
+    const image = share ? imageOf(images, k) : null;
+    const sum = sums.get(image ?? k);
+    if (sum) sum.share += share;
+    else if (share) {
+      const name = image?.name ?? lights[k]?.label ?? '';
+      sums.set(image ?? k, { key: image ? `image ${name}` : `${k}`, name, share });
+    }
   });
   return [...sums.values()];
 }

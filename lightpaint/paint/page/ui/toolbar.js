@@ -67,7 +67,8 @@ const PAINT_MODES = [
 /** @param {{ui: Ui, app: App}} props */
 export function ToolBar({ ui, app }) {
   const { store } = app;
-  const second = { ...ui, ...ui.second };
+  // A copy of the state would read all of it, and the bar would render for every change.
+  const second = Object.assign(Object.create(ui), ui.second);
   const style = {
     '--first': toHex(ui.colour),
     '--first-shown': displayColour(ui, app),
