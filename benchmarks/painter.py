@@ -88,8 +88,9 @@ WATCH = """() => {
   host.send = async (kind, fields, arrays) => {
     const at = kind === 'mix' ? mixing : moved;
     const reply = await send(kind, fields, arrays);
-    // Where the session mixes the picture, that comes after the answer.
-    if (kind === 'paint' && !fields.is_final) [mixing, answered] = [at, mirror.hasMixes ? 0 : at];
+    // Where the session mixes the picture, that comes with the answer or after it.
+    const isLater = mirror.hasMixes && !reply.arrays?.draft;
+    if (kind === 'paint' && !fields.is_final) [mixing, answered] = [at, isLater ? 0 : at];
     if (kind === 'mix' && fields.is_live) answered = at;
     return reply;
   };

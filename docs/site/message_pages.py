@@ -7,9 +7,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
-import numpy as np
 from docstring_fields import described_fields
 
 from lightpaint.paint.layers.layer_stack import Layer
@@ -24,7 +23,7 @@ from lightpaint.paint.protocol import (
     requests,
     task_events,
 )
-from lightpaint.paint.protocol.typescript import field_types
+from lightpaint.paint.protocol.typescript import field_types, is_array
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def _entry(entry: Entry, places: Mapping[str, str], page: str) -> list[str]:
     hints = get_type_hints(entry.record)
     rows = [(f"`{x}`", _linked(kind, places, page), x) for x, kind in _types(entry.record)]
     for field in fields(entry.record):
-        if get_origin(hints[field.name]) is np.ndarray:
+        if is_array(hints[field.name]):
             rows.append((f"`{field.name}`", "array", field.name))
     buffers: Mapping[str, str] = getattr(entry.record, "request_buffers", {})
     rows += [(f"`{x}`", f"array {meaning}", "") for x, meaning in buffers.items()]

@@ -113,6 +113,44 @@ def test_the_exact_picture_follows_a_draft_at_rest(client: StudioClient, basis: 
     assert not any(m.kind == "mixed" and m.number == 1 for m in client.messages)
 
 
+def test_paint_is_answered_with_its_draft(client: StudioClient, basis: lp.Basis) -> None:
+    """The one that a page would ask for afterwards, under the master dimmer."""
+    image, importance = np.full((6, 6, 3), 0.7, np.float32), np.ones((6, 6), np.float32)
+    client.studio.handle(protocol.SetMaster(level=0.5), {})
+    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), draft_step=2)
+    [answer] = client.studio.handle(request, {"image": image, "importance": importance})
+    assert isinstance(answer, protocol.AnswerUpdate)
+    assert answer.draft is not None
+    assert answer.draft_step == 2
+    assert not np.allclose(answer.weights, basis.current_weights)
+    asked_for = mixed(client, 0.5 * answer.weights, step=2, is_live=True).data
+    # Drafts follow from one another: round-off may turn the last bit of a half.
+    np.testing.assert_allclose(answer.draft.astype(float), asked_for.astype(float), rtol=2.0**-10)
+    assert answer.draft.shape == (H // 2, W // 2, 3)
+    plain = client.studio.handle(
+        replace(request, draft_step=None), {"image": image, "importance": importance}
+    )
+    assert plain[0].arrays.keys() == {"weights"}
+
+
+def test_paint_stops_the_exact_picture_of_an_earlier_answer(
+    client: StudioClient, basis: lp.Basis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client.studio._mixes, "_begin", lambda: None)
+    for slot in (protocol.ANSWER_SLOT, 1):
+        mixed(client, basis.current_weights, slot=slot)
+    image, importance = np.full((6, 6, 3), 0.7, np.float32), np.ones((6, 6), np.float32)
+    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), draft_step=1)
+    client.studio.handle(request, {"image": image, "importance": importance})
+    assert [slot for _, slot in client.studio._mixes._wanted] == [1]
+
+
+@pytest.mark.parametrize("step", [0, 9])
+def test_the_step_of_a_draft_is_checked(step: int) -> None:
+    with pytest.raises(ValueError, match="the step of a draft is 1 to 8"):
+        protocol.Paint(stroke=1, region=(0, 1, 0, 1), draft_step=step)
+
+
 def test_denoised_pictures_are_of_the_same_light(client: StudioClient, basis: lp.Basis) -> None:
     weights = np.random.default_rng(2).uniform(0.5, 1, (N, 3))
     mixed(client, weights)

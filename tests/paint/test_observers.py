@@ -433,9 +433,12 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
         weights=np.ones((2, 3)),
     )
     session_clients.Observers([slow]).send(patch)
-    [(message, _)] = slow._unsent
-    assert message.kind == "answer"
-    assert list(message.arrays) == ["weights"]
+    draft = np.zeros((1, 1, 3), np.float16)
+    session_clients.Observers([slow]).send(fake_answer(version=5, draft=draft, draft_step=2))
+    for message, _ in slow._unsent:
+        assert message.kind == "answer"
+        assert list(message.arrays) == ["weights"]
+        assert "draft_step" not in message.fields
 
 
 # Proposals

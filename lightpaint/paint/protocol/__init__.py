@@ -30,9 +30,10 @@ from lightpaint.paint.protocol.message_parts import (
     SkyAxes, StepInfo, TableInfo, Tone, TransformInfo, ViewInfo,
 )
 from lightpaint.paint.protocol.painting_requests import (
-    AddReference, ApplyPreset, ChangeLayers, ClearPainting, CompareLooks, CopyLook, DropLook,
-    DropReference, DropStroke, GoToStep, ImportLayers, ListSteps, LoadLook, LookLike, MixLights,
-    MixLooks, Paint, Propose, Redo, RenameLook, SaveLook, Select, ShowPrevious, StartOver, Undo,
+    ANSWER_SLOT, AddReference, ApplyPreset, ChangeLayers, ClearPainting, CompareLooks, CopyLook,
+    DropLook, DropReference, DropStroke, GoToStep, ImportLayers, ListSteps, LoadLook, LookLike,
+    MixLights, MixLooks, Paint, Propose, Redo, RenameLook, SaveLook, Select, ShowPrevious,
+    StartOver, Undo,
 )
 from lightpaint.paint.protocol.requests import (
     VERSION, BlackOut, ChangeSettings, DropRender, Explain, Export, Fetch, Hello, Observe, Preview,

@@ -101,6 +101,8 @@ class AnswerUpdate(message_parts.EditState, Findings, Event, kind="answer", is_o
     under the brush. reading: what these lights give on measuring planes, if there are any.
     weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
     null for other lights; some answers under the brush have them, exact ones have them in `lights`.
+    draft: if the paint asked for one, (h, w, 3) float16, the picture of these lights under the
+    master dimmer in the painted view: every draft_step-th pixel of every draft_step-th row.
     """
 
     version: int
@@ -108,6 +110,8 @@ class AnswerUpdate(message_parts.EditState, Findings, Event, kind="answer", is_o
     exact: bool
     mode: str
     weights: Doubles
+    draft: npt.NDArray[np.float16] | None = field(default=None, metadata=OPTIONAL)
+    draft_step: int | None = field(default=None, metadata=OPTIONAL)
     drives: tuple[tuple[float, ...] | None, ...] | None = field(default=None, metadata=OPTIONAL)
     reading: PlanesReading | None = field(default=None, metadata=OPTIONAL)
 

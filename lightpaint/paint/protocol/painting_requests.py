@@ -20,6 +20,9 @@ MAX_PAIRS = 20
 #: pixels of a draft.
 MAX_MIX_SLOTS, MAX_MIX_STEP = 16, 8
 
+#: The slot in which a page shows the answer.
+ANSWER_SLOT = 0
+
 
 @dataclass(frozen=True)
 class Paint(Request, kind="paint"):
@@ -30,7 +33,8 @@ class Paint(Request, kind="paint"):
     only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
     the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
     masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
-    on top. region: of these pixels.
+    on top. region: of these pixels. draft_step: of a view with `has_mixes`, the step between the
+    pixels and rows of a draft in the answer; null for none.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {
@@ -45,10 +49,13 @@ class Paint(Request, kind="paint"):
     view: int = 0
     layer: int = PAINTING_ID
     properties: Layer | None = None
+    draft_step: int | None = None
 
     def __post_init__(self) -> None:
         if self.stroke >= 2**53:  # largest exact integer of a page
             raise ValueError("stroke is a number below 2**53")
+        if self.draft_step is not None:
+            _check_step(self.draft_step)
 
 
 @dataclass(frozen=True)
@@ -58,8 +65,9 @@ class MixLights(Request, kind="mix"):
     follows unless `is_live`.
 
     slot, number: the page's own, which `mixed` returns: another `mix` for a slot stops an exact
-    picture that is not there yet. is_clean: whether to denoise it. is_live: whether more changes
-    follow. step: between the pixels and rows of the draft.
+    picture that is not there yet; so does `paint` with a draft for slot 0, the answer's. is_clean:
+    whether to denoise it. is_live: whether more changes follow. step: between the pixels and rows
+    of the draft.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {"weights": "(lights, 3) float64"}
@@ -74,8 +82,13 @@ class MixLights(Request, kind="mix"):
     def __post_init__(self) -> None:
         if not 0 <= self.slot < MAX_MIX_SLOTS:
             raise ValueError(f"slot is 0 to {MAX_MIX_SLOTS - 1}")
-        if not 1 <= self.step <= MAX_MIX_STEP:
-            raise ValueError(f"step is 1 to {MAX_MIX_STEP}")
+        _check_step(self.step)
+
+
+def _check_step(step: int) -> None:
+    """Raise ValueError for a step between the pixels of a draft that is none."""
+    if not 1 <= step <= MAX_MIX_STEP:
+        raise ValueError(f"the step of a draft is 1 to {MAX_MIX_STEP}")
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,11 @@ def _is_record_of(value: Any, module: Any) -> bool:
 def _interface(record: type[Any], *, is_request: bool) -> str:
     """Return one interface. is_request: whether fields with a default may be left out."""
     hints = get_type_hints(record)
-    array_names = [one.name for one in fields(record) if get_origin(hints[one.name]) is np.ndarray]
-    arrays = [f"{name}: Picture" for name in array_names]
+    arrays = [
+        f"{one.name}{'?' if _is_optional(one) else ''}: Picture"
+        for one in fields(record)
+        if is_array(hints[one.name])
+    ]
     lines = [f"  {name}: {kind};\n" for name, kind in field_types(record, is_request=is_request)]
     if record.__name__ in {one.__name__ for one in Event.kinds.values()}:
         lines.insert(0, f"  kind: '{record.kind}';\n  reply?: number;\n")
@@ -87,7 +90,7 @@ def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str
     """
     hints, types = get_type_hints(record), []
     for entry in fields(record):
-        if get_origin(hints[entry.name]) is np.ndarray:
+        if is_array(hints[entry.name]):
             continue
         is_event = record in Event.kinds.values() or not is_request
         is_optional = _is_optional(entry) or (not is_event and _has_default(entry))
@@ -118,6 +121,11 @@ def typescript_type(hint: Any) -> str:
     if hint in Event.kinds.values():  # nested messages have no kind
         return f"Omit<{hint.__name__}, 'kind' | 'arrays'>"
     return "any" if hint is Any else str(hint.__name__)
+
+
+def is_array(hint: Any) -> bool:
+    """Return whether an annotation is an array, or may be one."""
+    return any(get_origin(one) is np.ndarray for one in (hint, *get_args(hint)))
 
 
 def _without_none(hint: Any) -> Any:

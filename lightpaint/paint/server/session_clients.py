@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Collection, Coroutine, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
@@ -21,6 +22,7 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.protocol import (
     Acknowledgement,
+    AnswerUpdate,
     CanvasPatch,
     Closing,
     ConstrainLight,
@@ -164,6 +166,8 @@ class Observers:
     def send(self, message: Message, but: Client | None = None) -> None:
         """Send observers the events that concern them; newer events replace those that wait."""
         event = message.answer if isinstance(message, CanvasPatch) else message
+        if isinstance(event, AnswerUpdate) and event.draft is not None:  # for whoever paints
+            event = replace(event, draft=None, draft_step=None)
         if isinstance(event, Event) and event.is_observed:
             for client in self._clients:
                 if client.is_observer and client is not but:

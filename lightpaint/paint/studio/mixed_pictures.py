@@ -7,7 +7,7 @@ look, and soft shadows of lights that change. While lights rest, the exact pictu
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Lock
 from typing import Any
@@ -22,7 +22,14 @@ from lightpaint.images import block_mean, denoised, resampled
 from lightpaint.lighting import LiveView
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.protocol import Message, MixedPicture, MixLights
+from lightpaint.paint.protocol import (
+    ANSWER_SLOT,
+    AnswerUpdate,
+    Message,
+    MixedPicture,
+    MixLights,
+    Paint,
+)
 from lightpaint.paint.session.picture_table import Picture, page_factor
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.studio.exact_answers import OutdatedError
@@ -116,8 +123,31 @@ class MixedPictures:
                 self._wanted[key] = _Mix(message, view.basis, weights)
         if not message.is_live:
             self._begin()
-        drafts = self._drafts.setdefault(message.view, DraftPictures())
-        return [_answer(message, drafts.picture(view, weights, message.step), step=message.step)]
+        draft = self._draft(message.view, weights, message.step)
+        return [_answer(message, draft, step=message.step)]
+
+    def with_draft(self, paint: Paint, messages: list[Message]) -> list[Message]:
+        """Return the messages that answer some paint, with a draft in the answer if it asks for
+        one: asked for afterwards, it would be on its way twice, and behind the next paint.
+        """
+        if paint.draft_step is None:
+            return messages
+        session = self._access.session
+        with self._lock:
+            self._wanted.pop((paint.view, ANSWER_SLOT), None)
+        weights = session.requests.output(session.weights, session.basis.is_fixed)
+        draft = self._draft(paint.view, weights, paint.draft_step)
+        return [
+            replace(x, draft=draft, draft_step=paint.draft_step)
+            if isinstance(x, AnswerUpdate)
+            else x
+            for x in messages
+        ]
+
+    def _draft(self, view: int, weights: Doubles, step: int) -> Picture:
+        """Return the draft of a lighting in a view. weights: (n, 3). step: as in a request."""
+        drafts = self._drafts.setdefault(view, DraftPictures())
+        return drafts.picture(self._access.session.views[view], weights, step)
 
     def _begin(self) -> None:
         """Have the thread look at what is wanted, and start it for the first."""

@@ -306,6 +306,8 @@ class Studio:
                 case _:
                     messages = session.handle(message, arrays)
             messages = self._show_moves(messages, view=view)
+            if isinstance(message, protocol.Paint):
+                messages = self._mixes.with_draft(message, messages)
             has_changed = session.version != version
             if has_changed:
                 self._console.follow(session)

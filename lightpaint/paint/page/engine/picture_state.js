@@ -23,6 +23,9 @@ export class PictureState {
     /** @type {Display | null} */
     this.display = null;
     this.weights = new Float64Array();
+    /** The picture of the weights that are being taken, where it has come with them.
+     * @type {{halves: Uint16Array, step: number} | null} */
+    this.draft = null;
     /** Whether lights have moved since the current look. */
     this.haveLightsMoved = false;
     /** @type {Lut} */
@@ -47,6 +50,17 @@ export class PictureState {
     return Boolean(this.state?.hasMixes);
   }
 
+  /** Whether the solution is the answer under the master dimmer, and not a part of it or a look. */
+  get showsAnswer() {
+    const { visibleLights, solutionWeights } = this.display ?? {};
+    return !solutionWeights && !visibleLights?.includes(false);
+  }
+
+  /** The step between the pixels of the draft that an answer to paint is to have; null for none. */
+  get draftStep() {
+    return this.hasMixes && this.showsAnswer ? this.mixes.draftStep : null;
+  }
+
   /** Number of planes of the view before the planes of compared looks. */
   get mixedCount() {
     return this.hasMixes ? MIX_SLOTS : (this.state?.lights.length ?? 0);
@@ -62,7 +76,11 @@ export class PictureState {
     const weights = message.arrays?.weights?.data;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
+    const { draft } = message.arrays;
+    const halves = /** @type {Uint16Array | undefined} */ (draft?.data);
+    this.draft = halves ? { halves, step: message.draft_step } : null;
     this.showWeights();
+    this.draft = null;
     // The exact answer comes when the brush rests, and should be drawn sharply.
     this.screen.requestDraw(!message.exact);
   }
@@ -150,7 +168,8 @@ export class PictureState {
   showMix(slot, weights) {
     const isLit = weights.some((weight) => weight !== 0);
     const isLook = slot === SOLUTION_SLOT && this.isLookNow;
-    if (isLit && !isLook) this.mixes.show(slot, weights);
+    const draft = slot === SOLUTION_SLOT && this.showsAnswer ? this.draft : null;
+    if (isLit && !isLook) this.mixes.show(slot, weights, draft);
     return isLit;
   }
 

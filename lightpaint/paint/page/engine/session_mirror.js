@@ -134,6 +134,7 @@ export class SessionMirror extends PictureState {
       this.strokes = new StrokeSender(this.host, requestState, reportLoss);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
       this.strokes.onSettled = () => this.layers.adopt(false);
+      this.strokes.draftStep = () => this.draftStep;
     }
     this.strokes.paintOn(this.canvas, view);
     this.layers.open(this.canvas, view);

@@ -2,20 +2,21 @@
  * Pictures of lightings that the session mixes, where the lights are too many for a page to hold
  * their planes.
  *
- * Each slot of the view's planes shows one lighting. Drafts come at once, one in flight for each
- * slot; the exact picture comes after a pause without changes.
+ * Each slot of the view's planes shows one lighting. Drafts come at once, with the answer to paint or
+ * one in flight for each slot; the exact picture comes after a pause without changes.
  */
-import { nameInView, repeatPixels } from './message_frames.js';
-import { toFloats } from '../../../viewer/drawing/half_floats.js';
+import { nameInView } from './message_frames.js';
+import { repeatPixels, toFloats } from '../../../viewer/drawing/half_floats.js';
 import { COMPARED_COUNT } from './picture_slots.js';
 
 /** @typedef {import("./message_frames.js").Message} Message */
 /** @typedef {import("./picture_canvas.js").Screen} Screen */
 /** @typedef {import("./socket_host.js").Host} Host */
-/** number: of the last request. isBusy: whether a draft is in flight; isNew: whether the next has
- * been asked for. halves: its picture, of the planes' size.
- * @typedef {{weights: Float64Array, number: number, isBusy: boolean, isNew: boolean,
- *   halves: Uint16Array | null, timer: ReturnType<typeof setTimeout> | undefined}} Slot */
+/** number: of the last lighting; shown: of the lighting whose picture is here. isBusy: whether a draft
+ * is in flight; isNew: whether the next has been asked for. halves: the picture, of every step-th
+ * pixel of every step-th row.
+ * @typedef {{weights: Float64Array, number: number, shown: number, isBusy: boolean, isNew: boolean,
+ *   step: number, halves: Uint16Array | null, timer?: ReturnType<typeof setTimeout>}} Slot */
 
 /** Slots of the two pictures, the first of the slots of looks that are side by side, and their
  * number. */
@@ -46,14 +47,25 @@ export class SessionMixes {
     host.on('mixed', (message) => this.take(message));
   }
 
-  /** Show a lighting in a slot. @param {number} index @param {Float64Array} weights (n, 3) */
-  show(index, weights) {
+  /** Show a lighting in a slot. @param {number} index @param {Float64Array} weights (n, 3)
+   * @param {{halves: Uint16Array, step: number} | null} [draft] of it, if it is here */
+  show(index, weights, draft = null) {
     const known = this.slots.get(index);
     if (known && isSame(known.weights, weights)) return;
-    const slot = known ?? { weights, number: 0, isBusy: false, isNew: true, halves: null, timer: undefined };
+    const picture = { number: 0, shown: 0, step: 1, halves: null };
+    const slot = known ?? { weights, isBusy: false, isNew: true, ...picture };
     this.slots.set(index, slot);
     slot.weights = weights;
-    this.ask(index, slot);
+    if (draft) this.showDraft(index, slot, draft);
+    else this.ask(index, slot);
+  }
+
+  /** Show the draft that has come with a lighting. @param {number} index @param {Slot} slot
+   * @param {{halves: Uint16Array, step: number}} draft */
+  showDraft(index, slot, { halves, step }) {
+    slot.isNew = false;
+    this.note(index, slot);
+    this.setPicture(index, slot, halves, step, slot.number);
   }
 
   /** Ask for the pictures of all slots again, since planes have changed. */
@@ -77,10 +89,16 @@ export class SessionMixes {
   /** @param {number} index @param {Slot} slot */
   ask(index, slot) {
     slot.isNew = true;
+    this.note(index, slot);
+    if (!slot.isBusy) void this.askForDrafts(index, slot);
+  }
+
+  /** Note another lighting of a slot, whose exact picture is to follow. @param {number} index
+   * @param {Slot} slot */
+  note(index, slot) {
     slot.number = ++this.number;
     clearTimeout(slot.timer);
     slot.timer = setTimeout(() => this.askForExact(index, slot), PAUSE_MS);
-    if (!slot.isBusy) void this.askForDrafts(index, slot);
   }
 
   /** @param {number} index @param {Slot} slot */
@@ -103,13 +121,18 @@ export class SessionMixes {
 
   /** @param {number} index @param {Slot} slot @param {boolean} isLive */
   send(index, { weights, number }, isLive) {
-    const { view, isClean, screen } = this;
-    const [height, width] = screen.planeSize;
-    const step = isLive && height * width > MAX_DRAFT_PIXELS ? 2 : 1;
+    const { view, isClean } = this;
+    const step = isLive ? this.draftStep : 1;
     const fields = { slot: index, number, view, is_clean: isClean, is_live: isLive, step };
     return this.host.send('mix', fields, {
       weights: { data: weights, shape: [weights.length / 3, 3] },
     });
+  }
+
+  /** The step between the pixels and rows of drafts. */
+  get draftStep() {
+    const [height, width] = this.screen.planeSize;
+    return height * width > MAX_DRAFT_PIXELS ? 2 : 1;
   }
 
   /** @param {Message} message */
@@ -117,17 +140,24 @@ export class SessionMixes {
     const slot = this.slots.get(index);
     const isWanted = slot && view === this.view && index < this.screen.count;
     // A draft of a moment ago is better than none; an exact picture is of the present lighting.
-    if (!isWanted || (isExact && number !== slot.number)) return;
-    slot.halves = repeatPixels(arrays.data, step, this.screen.planeSize);
-    this.screen.view?.setPlane(index, slot.halves, 1);
+    if (!isWanted || number < slot.shown || (isExact && number !== slot.number)) return;
+    this.setPicture(index, slot, /** @type {Uint16Array} */ (arrays.data.data), step, number);
     this.screen.requestDraw(!isExact);
+  }
+
+  /** @param {number} index @param {Slot} slot @param {Uint16Array} halves @param {number} step
+   * @param {number} shown */
+  setPicture(index, slot, halves, step, shown) {
+    Object.assign(slot, { halves, step, shown });
+    this.screen.view?.setPlane(index, halves, 1, step);
   }
 
   /** Return the light of the picture in a slot, (h, w, 3) of the view's size, by the nearest pixel;
    * null if there is none yet. @param {number} index */
   lightOf(index) {
-    const halves = this.slots.get(index)?.halves;
-    if (!halves) return null;
+    const slot = this.slots.get(index);
+    if (!slot?.halves) return null;
+    const halves = repeatPixels(slot.halves, slot.step, this.screen.planeSize);
     const [[height, width], [rows, columns]] = [this.screen.size, this.screen.planeSize];
     if (rows === height && columns === width) return toFloats(halves);
     const light = new Float32Array(3 * height * width);

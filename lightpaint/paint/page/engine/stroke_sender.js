@@ -29,6 +29,10 @@ import { plainLayer } from './layers/layer_list.js';
  * @typedef {{select: Select, arrays: Arrays, onAnswer: (isTaken: boolean) => void}} PendingSelection */
 
 export class StrokeSender {
+  /** Returns the step of drafts that answers to paint are to have; null for none.
+   * @type {() => number | null} */
+  draftStep = () => null;
+
   /** @param {import("./socket_host.js").Host} host
    * @param {() => void} [onRefusal] hears that the session has not taken a stroke
    * @param {(count: number, isStale: boolean) => void} [onLoss] hears how many strokes are not sent
@@ -251,7 +255,10 @@ export class StrokeSender {
       const { stroke, view, dirty, canvas, layerOf } = this.currentStroke;
       this.currentStroke.dirty = null;
       this.currentStroke.isKnown = true;
-      const fields = { stroke, view, region: dirty, is_final: false, ...layerFields(layerOf()) };
+      const fields = {
+        ...{ stroke, view, region: dirty, is_final: false, draft_step: this.draftStep() },
+        ...layerFields(layerOf()),
+      };
       this.send('paint', fields, canvas.copy(dirty), null);
     }
   }
