@@ -43,8 +43,8 @@ _MAGNITUDE, _INFINITY, _LEAST_NORMAL = map(np.uint32, (2**31 - 1, 255 << 23, 113
 _HALF_INFINITY, _HALF_SIGN = np.uint16(0x7C00), np.uint16(0x8000)
 _HALF_NAN = np.uint32(0x7E00)
 
-#: Of a half float whose digits are shifted to those of float32: its sign and digits, and the ratio
-#: of what its exponent means there and here.
+#: Of a half float whose digits are shifted to their places in float32: its sign and digits, and
+#: the ratio of what its exponent means there and here.
 _SIGN_AND_DIGITS = np.uint32(0x8FFFE000).view(np.int32)
 _RAISED_EXPONENT = np.float32(2.0**112)
 

@@ -92,6 +92,8 @@ def test_doors_list_each_name_once_and_modules_in_order() -> None:
         names = [alias.name for _, node in inner for alias in node.names]
         assert homes == sorted(set(homes)), path
         assert len(names) == len(set(names)), path
+        # A module that is imported would stand for the function of its name.
+        assert not {x.stem for x in path.parent.glob("*.py")} & set(names), path
         doors += 1
     assert doors >= 18
 

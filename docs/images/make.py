@@ -44,9 +44,9 @@ from clean import Floats, Surfaces, denoise, see  # noqa: E402
 import lightpaint as lp  # noqa: E402
 from lightpaint.basis.lights import light_images  # noqa: E402
 from lightpaint.images.denoiser import denoised  # noqa: E402
-from lightpaint.report.hung_lights import hung_lights  # noqa: E402
+from lightpaint.report.hung_light import hung_lights  # noqa: E402
 from lightpaint.report.page.placement_section import aim_picture  # noqa: E402
-from lightpaint.report.rig_drawing import rig_drawing  # noqa: E402
+from lightpaint.report.rig_plan import rig_drawing  # noqa: E402
 from lightpaint.scene.scene_render import Stream, render  # noqa: E402
 
 SIZE = (1280, 720)

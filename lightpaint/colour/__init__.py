@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lightpaint.colour.color_ranges import (
         DIRECTIONS, ROUND_OFF, ColorHull, WhiteRange, chromaticity, reach_of, sides_of, white_range,
     )
-    from lightpaint.colour.color_rendering import (
+    from lightpaint.colour.rendering_indices import (
         ColorRendering, adapted_color, color_rendering, fidelity, white_of,
     )
     from lightpaint.colour.display.exposure import choose_exposure

@@ -18,14 +18,14 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.colour import Preference
 from lightpaint.colour.color import cct_and_duv, ciede2000, lab_of_lights, luminance
-from lightpaint.colour.color_rendering import (
+from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
+from lightpaint.colour.rendering_indices import (
     MARGIN,
     MixFidelity,
     best_mix,
     cheapest_mix,
     fidelity,
 )
-from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.colour.spectrum import WAVELENGTHS, Spectrum
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number. Most

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         spoken_came, spoken_cause, spoken_errors, spoken_mean_shares, spoken_newest, spoken_shares,
         uncertainty_sentence, unreached_channels, untold_lights,
     )
-    from lightpaint.report.hung_lights import (
+    from lightpaint.report.hung_light import (
         HungLight, HungLights, LightChange, hung_lights, spoken_fraction,
     )
     from lightpaint.report.measures import (
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         planes_numbers, planes_sentences,
     )
     from lightpaint.report.report_json import finite, report_numbers, verification_numbers
-    from lightpaint.report.rig_drawing import rig_drawing
+    from lightpaint.report.rig_plan import rig_drawing
     from lightpaint.report.verdict_sentences import (
         agreement, headline, spoken_distance, spoken_lack, spoken_missing, spoken_on_the_whole,
         spoken_reason, spoken_whole, verdict,

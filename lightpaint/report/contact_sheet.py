@@ -17,12 +17,12 @@ from lightpaint.display_text import visible
 from lightpaint.images import block_mean, denoised
 from lightpaint.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
-from lightpaint.report.hung_lights import HungLight
+from lightpaint.report.hung_light import HungLight
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
 from lightpaint.report.page.lights_table import map_picture, map_stops
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.rig_drawing import rig_drawing
+from lightpaint.report.rig_plan import rig_drawing
 
 #: Maximum number of lights shown; the others, with the smallest shares, are counted.
 MAX_LIGHTS = 64

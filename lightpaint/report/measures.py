@@ -23,7 +23,7 @@ from lightpaint.lighting import (
 )
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
-from lightpaint.report.hung_lights import HungLights
+from lightpaint.report.hung_light import HungLights
 from lightpaint.target import Target
 
 #: Share of a picture's light from which on a light's error counts in proportion to the light.

@@ -35,7 +35,7 @@ from lightpaint.report.answer_pictures import (
     residual_of,
 )
 from lightpaint.report.diagnosis_sentences import UNTOLD_HERE, fit_options
-from lightpaint.report.hung_lights import placement_numbers
+from lightpaint.report.hung_light import placement_numbers
 from lightpaint.report.page.lights_table import rendering_numbers
 from lightpaint.report.page.limit_sections import maps_limit
 from lightpaint.report.planes_text import planes_numbers

@@ -15,7 +15,7 @@ from lightpaint.images.formats.png import png_has_text
 from lightpaint.pipeline import templates
 from lightpaint.pipeline.result_folder import write_answer
 from lightpaint.pipeline.templates import SHEET_KEY, recorded_places
-from lightpaint.report.rig_drawing import CHANGED
+from lightpaint.report.rig_plan import CHANGED
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant

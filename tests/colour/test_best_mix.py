@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_rendering import MARGIN, MixFidelity, fidelity
 from lightpaint.colour.lamp import Lamp, LampEmitter
+from lightpaint.colour.rendering_indices import MARGIN, MixFidelity, fidelity
 from lightpaint.colour.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
 
 #: Peak and width in nanometres, and watts.

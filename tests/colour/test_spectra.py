@@ -9,9 +9,9 @@ import pytest
 from rig_files import gdtf
 
 from lightpaint.colour.color import kelvin_to_rgb, xy_of, xy_of_spectrum
-from lightpaint.colour.color_rendering import color_rendering, fidelity
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.rendering_indices import color_rendering, fidelity
 from lightpaint.colour.spectrum import (
     WAVELENGTHS,
     named_spectrum,

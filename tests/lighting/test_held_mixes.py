@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import delta_e, kelvin_to_rgb
-from lightpaint.colour.color_rendering import fidelity
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.rendering_indices import fidelity
 from lightpaint.colour.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.analysis.rendered_colors import renderings_of

@@ -11,7 +11,7 @@ from PIL import ImageDraw
 
 from lightpaint.images.denoiser import Features
 from lightpaint.report.contact_sheet import light_sheet
-from lightpaint.report.hung_lights import (
+from lightpaint.report.hung_light import (
     HungLight,
     HungLights,
     LightChange,
@@ -19,7 +19,7 @@ from lightpaint.report.hung_lights import (
     spoken_fraction,
 )
 from lightpaint.report.page.placement_section import aim_picture, placement_section
-from lightpaint.report.rig_drawing import CHANGED, FINER, plan_and_elevation, rig_drawing
+from lightpaint.report.rig_plan import CHANGED, FINER, plan_and_elevation, rig_drawing
 from lightpaint.scene.properties.site import EmitterPlace, Site
 
 EYE, FOCAL, SIZE = np.array([0.5, 1.5, 4.0]), 60.0, (48, 64)

@@ -177,7 +177,7 @@ class NodeEmission:
         return [*first, self.multiplier, *last]
 
     def _convert(self):
-        """Let the multiplication work in Rec.709, whatever space the file has."""
+        """Multiply in Rec.709, whatever space the file has."""
         space = file_space()
         if space is not None and len(self._chain()) == 1:
             before, after = self._add("Group", -350), self._add("Group", -50)

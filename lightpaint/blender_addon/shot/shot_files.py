@@ -18,7 +18,7 @@ MAX_JSON_FILE = 2**26
 
 
 def read_json(path):
-    """Return what a file with JSON has. Raises OSError or ValueError, also for what is no file."""
+    """Return what a file with JSON has. Raises OSError or ValueError."""
     if not os.path.isfile(path) or os.path.getsize(path) > MAX_JSON_FILE:
         raise ValueError(f"{path} is not a file that lightpaint has written")
     try:

@@ -171,8 +171,8 @@ class ManyLights:
         # as long as its gradient stays the same, at a bound or not.
         self._settled = np.zeros((count, 3))
         self._has_moved = np.zeros(count, bool)
-        # A picture reads all rows, and the gradient of the pull all its squares: those of the
-        # starts of the last round are kept, and the picture that it came to.
+        # A picture reads all rows, and the gradient of the pull all its squares: what the starts
+        # of the last round had is kept, and the picture that it came to.
         self._rows: Floats | None = None
         self._pictures: dict[bytes, Doubles] = {}
         self._rounds = 0  # since a picture was the sum of all lights

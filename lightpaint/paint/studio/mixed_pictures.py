@@ -128,7 +128,7 @@ class MixedPictures:
 
     def with_draft(self, paint: Paint, messages: list[Message]) -> list[Message]:
         """Return the messages that answer some paint, with a draft in the answer if it asks for
-        one: asked for afterwards, it would be on its way twice, and behind the next paint.
+        one, which would come later, and behind the next paint, if the page asked for it afterwards.
         """
         if paint.draft_step is None:
             return messages

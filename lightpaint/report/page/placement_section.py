@@ -13,11 +13,11 @@ from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images import Features, denoised
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
-from lightpaint.report.hung_lights import HungLight, HungLights, ViewGeometry, spoken_fraction
+from lightpaint.report.hung_light import HungLight, HungLights, ViewGeometry, spoken_fraction
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.rig_drawing import CHANGED, FINER, GROUND, arrow, circle, rig_drawing
+from lightpaint.report.rig_plan import CHANGED, FINER, GROUND, arrow, circle, rig_drawing
 from lightpaint.scene.properties.site import Site
 
 #: Width that narrower pictures are enlarged to.

@@ -99,7 +99,7 @@ export class Mix {
 
 /** @typedef {{halves: Uint16Array, step: number, weights: number[]}} Term */
 
-/** Add planes to light, those of all pixels four at a time.
+/** Add planes to light, four at a time in all pixels.
  * @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth width of the planes
  * @param {number} width of the light @param {number} step @param {boolean} startsFromBlack whether light
  * starts from black */

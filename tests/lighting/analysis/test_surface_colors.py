@@ -10,8 +10,8 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_rendering import adapted_color
 from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.rendering_indices import adapted_color
 from lightpaint.colour.spectrum import (
     WAVELENGTHS,
     daylight,

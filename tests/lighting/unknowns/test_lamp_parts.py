@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_rendering import fidelity
+from lightpaint.colour.rendering_indices import fidelity
 from lightpaint.colour.spectrum import rgb_of_powers
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.answer_analysis import analyse

@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import RGB, Doubles, Position
 from lightpaint.display_text import visible
 from lightpaint.images import Features
-from lightpaint.report.hung_lights import HungLight, ViewGeometry
+from lightpaint.report.hung_light import HungLight, ViewGeometry
 from lightpaint.scene.properties.site import Site
 
 #: Colours of texts and of changes.
