@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from lightpaint.colour.color_ranges import (
         DIRECTIONS, ROUND_OFF, ColorHull, WhiteRange, chromaticity, reach_of, sides_of, white_range,
     )
-    from lightpaint.colour.rendering_indices import (
-        ColorRendering, adapted_color, color_rendering, fidelity, white_of,
-    )
     from lightpaint.colour.display.exposure import choose_exposure
     from lightpaint.colour.display.tone_curves import BUILT_IN
     from lightpaint.colour.display.view_transform import (
@@ -38,6 +35,9 @@ if TYPE_CHECKING:
         ACESCG, REC709, REC2020, SPACES, Profile, are_same, converted, decode_display,
         encode_display, from_rec709, gamma_profile, is_rec709, primaries_in, read_icc, rgb_to_xyz,
         srgb_profile, to_8_bit, to_rec709,
+    )
+    from lightpaint.colour.rendering_indices import (
+        ColorRendering, adapted_color, color_rendering, fidelity, white_of,
     )
     from lightpaint.colour.spectrum import (
         EYE, FEWEST_POINTS, STEP, WAVELENGTHS, Observer, Spectrum, daylight, file_of_spectrum,
