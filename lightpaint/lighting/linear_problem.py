@@ -17,17 +17,10 @@ from lightpaint.basis import Basis, Lights, texel_lights
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
+from lightpaint.lighting.constraints import light_constraints
 from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.light_constraints import (
-    WhiteLimits,
-    keep_own_colors,
-    own_color_labels,
-    painted_whites,
-    start_weights,
-    whiten_open_lights,
-)
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.painting import ignored_paint
@@ -198,7 +191,7 @@ class LinearProblem:
     @cached_property
     def reference(self) -> Doubles:
         """(n, 3), the lighting to start from: the current one, unless another was set by hand."""
-        return start_weights(self.constraints.start, self.lights)
+        return light_constraints.start_weights(self.constraints.start, self.lights)
 
     @cached_property
     def pull(self) -> NormalEquations | None:
@@ -311,11 +304,11 @@ class SummedProblem(LinearProblem):
         return weights
 
 
-def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
+def whites_for(expected: ExpectedLights | None, fit: Fit) -> light_constraints.WhiteLimits | None:
     """Return the ranges of lights that are to be white; None for others."""
     if fit.colors != "white" or expected is None:
         return None
-    return painted_whites(expected.painted)
+    return light_constraints.painted_whites(expected.painted)
 
 
 def reduce_lights(
@@ -323,7 +316,7 @@ def reduce_lights(
     lights: Lights,
     fit: Fit,
     gamuts: Gamuts | None = None,
-    whites: WhiteLimits | None = None,
+    whites: light_constraints.WhiteLimits | None = None,
 ) -> Reduction:
     """Reduce the lights to the unknowns that constraints and the options for colours leave.
 
@@ -331,15 +324,15 @@ def reduce_lights(
     whose constraints exclude white.
     """
     if fit.colors == "white":
-        constraints = whiten_open_lights(constraints, lights, whites)
+        constraints = light_constraints.whiten_open_lights(constraints, lights, whites)
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
     reduction = reduce_to(constraints, lights)
     is_joined = is_joined or reduction.is_joined
     reduction = replace(reduction, is_joined=is_joined)
     if fit.colors == "own":
-        labels = own_color_labels(reduction.labels, constraints, lights)
-        dimmers = reduce_to(keep_own_colors(constraints, lights), lights)
+        labels = light_constraints.own_color_labels(reduction.labels, constraints, lights)
+        dimmers = reduce_to(light_constraints.keep_own_colors(constraints, lights), lights)
         return replace(dimmers, is_joined=is_joined, labels=labels)
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)
 
@@ -429,7 +422,7 @@ def summed_problem(
         reduction=reduction,
         full=reduction,
         fit=fit,
-        start=start_weights(all_constraints.start, lights),
+        start=light_constraints.start_weights(all_constraints.start, lights),
         scene_identity=scene_identity,
         spp=spp,
     )

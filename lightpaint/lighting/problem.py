@@ -16,18 +16,13 @@ from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
+from lightpaint.lighting import linear_problem
 from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.light_constraints import held_at_start, start_weights
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
-from lightpaint.lighting.linear_problem import (
-    LinearProblem,
-    PaintReading,
-    reduce_lights,
-    whites_for,
-)
 from lightpaint.lighting.loss import painting
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -110,7 +105,7 @@ class Refinement:
 
 @keywords()
 @dataclass(frozen=True)
-class Problem(LinearProblem):
+class Problem(linear_problem.LinearProblem):
     """The loss of pictures from a basis, and the freedom of the lights.
 
     Attributes:
@@ -206,8 +201,8 @@ class Problem(LinearProblem):
         reading = ViewsReading(views, whole.power, reference, fit)
         terms = reading.terms()
         gamuts = reading.gamuts(around_of(terms.expected))
-        whites = whites_for(terms.expected, fit)
-        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
+        whites = linear_problem.whites_for(terms.expected, fit)
+        reduction = linear_problem.reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
             basis=whole,
             views=views,
@@ -342,7 +337,7 @@ def _resolve_views(
     return Views(bases, tuple(resolved)), fit
 
 
-class ViewsReading(PaintReading):
+class ViewsReading(linear_problem.PaintReading):
     """The demands of the paintings of views on their lights.
 
     power, own, fit: as in `PaintReading`. wash: returns the wash of the views, by default a new

@@ -24,13 +24,7 @@ from lightpaint.lighting.linear_solve import (
     solve_mixed,
     solve_squares,
 )
-from lightpaint.lighting.loss.lit_pixels import (
-    BinnedPixels,
-    DeferredSquares,
-    LitPixels,
-    bin_pixels,
-    block_side,
-)
+from lightpaint.lighting.loss import lit_pixels
 from lightpaint.lighting.loss.reweighting import (
     MANY_LIGHTS,
     MIN_STEP,
@@ -46,14 +40,8 @@ from lightpaint.lighting.loss.weight_penalty import is_spoilt_by_contrast, pull_
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns import reduced_problem
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
-from lightpaint.lighting.unknowns.reduced_problem import (
-    ReducedOptimum,
-    ReducedSolver,
-    nearest_unknowns,
-    nearest_weights,
-    solve_reduced,
-)
 from lightpaint.lighting.unknowns.reduction import Reduction, lamps_by_name
 from lightpaint.lighting.unknowns.white_mixes import next_whites
 
@@ -151,7 +139,7 @@ def _solve_whole(problem: Problem, begin: Doubles) -> Solution:
 
     def with_slots_of(found: Problem, weights: Doubles) -> Solution:
         at_slots = replace(problem, reduction=found.reduction, full=found.full)
-        near = nearest_weights(at_slots.reduction, weights)
+        near = reduced_problem.nearest_weights(at_slots.reduction, weights)
         return _descend(at_slots, near, reached, blocks)
 
     solution = at_slots(mixed, with_slots_of)
@@ -164,7 +152,7 @@ def _solve_whole(problem: Problem, begin: Doubles) -> Solution:
 
 
 def _solve_rounds(
-    problem: Problem, begin: Doubles, blocks: BinnedPixels | None
+    problem: Problem, begin: Doubles, blocks: lit_pixels.BinnedPixels | None
 ) -> tuple[Solution, Bools]:
     """Solve a loss that is not linear from weights (n, 3), with mixed slots of colour wheels.
 
@@ -192,10 +180,10 @@ def _solve_rounds(
     return solution.with_certificate_fields(curve=first.certificate.curve), reached
 
 
-def _blocks_of(problem: Problem) -> BinnedPixels | None:
+def _blocks_of(problem: Problem) -> lit_pixels.BinnedPixels | None:
     """Return the blocks of pixels to fit; None for single pixels."""
-    side = block_side(problem.views.bases, problem.loss.transform)
-    return bin_pixels(problem.views, problem.loss, side) if side > 1 else None
+    side = lit_pixels.block_side(problem.views.bases, problem.loss.transform)
+    return lit_pixels.bin_pixels(problem.views, problem.loss, side) if side > 1 else None
 
 
 def solve_again(solution: Solution, problem: Problem) -> Solution:
@@ -242,7 +230,7 @@ def _solution(answer: LinearAnswer[Problem]) -> Solution:
 
 
 def _descend(
-    problem: Problem, start: Doubles, reached: Bools, blocks: BinnedPixels | None
+    problem: Problem, start: Doubles, reached: Bools, blocks: lit_pixels.BinnedPixels | None
 ) -> Solution:
     """Descend from weights (n, 3) to the least loss under the constraints.
 
@@ -291,7 +279,7 @@ class _LeastLoss:
     """
 
     descent: Descent
-    optimum: ReducedOptimum
+    optimum: reduced_problem.ReducedOptimum
     loss: float
     pulled: NormalEquations
 
@@ -299,7 +287,7 @@ class _LeastLoss:
 def _least_loss(
     problem: Problem,
     start: Doubles,
-    blocks: BinnedPixels | None,
+    blocks: lit_pixels.BinnedPixels | None,
     *,
     is_near: bool,
     until: float,
@@ -313,7 +301,7 @@ def _least_loss(
     if blocks is not None:
         basis, loss = blocks.basis, blocks.loss
         pull = blocks.prior if pull is None else pull + blocks.prior
-    solver = ReducedSolver(problem.reduction, pull=pull, method=problem.fit.method)
+    solver = reduced_problem.ReducedSolver(problem.reduction, pull=pull, method=problem.fit.method)
 
     def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
         return solver.solve(equations, begin).weights
@@ -338,7 +326,7 @@ def _least_loss(
         )
 
     descent = descend_from(start)
-    lit = LitPixels.of(basis, loss)
+    lit = lit_pixels.LitPixels.of(basis, loss)
 
     def loss_at(weights: Doubles) -> float:
         return total_loss(lit.pixels, WeightTerms(pull), weights, lit.predicted(weights))
@@ -356,7 +344,7 @@ def _least_loss(
 
 
 def _solution_at(
-    problem: Problem, low: _LeastLoss, reached: Bools, blocks: BinnedPixels | None
+    problem: Problem, low: _LeastLoss, reached: Bools, blocks: lit_pixels.BinnedPixels | None
 ) -> Solution:
     """Return the solution at the end of a descent. reached: as in `solve_linear`."""
     descent, optimum = low.descent, low.optimum
@@ -379,10 +367,10 @@ def _from_current(problem: Problem, found: Doubles) -> Doubles:
     requirements = problem.reduction.requirements
     if requirements is None:
         return nearest_to_current(problem)
-    begin = nearest_weights(problem.reduction, problem.reference)
+    begin = reduced_problem.nearest_weights(problem.reduction, problem.reference)
     rows, least = problem.reduction.required
     at_begin, at_end = (
-        rows @ nearest_unknowns(problem.reduction, w, np.ones(len(w), bool)) - least
+        rows @ reduced_problem.nearest_unknowns(problem.reduction, w, np.ones(len(w), bool)) - least
         for w in (begin, found)
     )
     missed = (at_begin < 0) & (at_end > at_begin)
@@ -394,24 +382,26 @@ def nearest_to_current(problem: Problem) -> Doubles:
     """Return the weights (n, 3) nearest to those to start from that constraints allow."""
     current, reduction = problem.reference, problem.reduction
     if len(current) >= MANY_LIGHTS:
-        nearest = nearest_weights(reduction, current)
+        nearest = reduced_problem.nearest_weights(reduction, current)
         if np.allclose(nearest, current, rtol=1e-9, atol=0):
             return nearest
     pull = pull_to_current(problem.basis.power, current)
-    return solve_reduced(pull, reduction, current).weights
+    return reduced_problem.solve_reduced(pull, reduction, current).weights
 
 
-def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels) -> Problem:
+def _problem_of_blocks(
+    problem: Problem, descent: Descent, blocks: lit_pixels.BinnedPixels
+) -> Problem:
     """Return the problem of all pixels, with squares that stand for its loss at the answer of
     blocks.
 
     Its corrected equations are the equations of the blocks with their prior: without most of the
     noise.
     """
-    weights, lit = descent.reweighting.at, LitPixels.whole(problem.basis, problem.loss)
+    weights, lit = descent.reweighting.at, lit_pixels.LitPixels.whole(problem.basis, problem.loss)
     return replace(
         problem,
-        squares=DeferredSquares(lit, weights),
+        squares=lit_pixels.DeferredSquares(lit, weights),
         equations=lit.equations_at(weights),
         corrected=descent.equations + blocks.prior,
         noise_removed=1 - 1 / blocks.side**2,

@@ -19,6 +19,7 @@ from lightpaint.display_text import Listed, Shown, some_of, visible
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.luminaires import LUMINAIRE_PLUGINS
+from lightpaint.scene.lights import new_emitter
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
 from lightpaint.scene.lights.hung_luminaires import HungLuminaire
 from lightpaint.scene.lights.image_split import with_split
@@ -34,12 +35,6 @@ from lightpaint.scene.lights.light import (
     settings_for,
 )
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
-from lightpaint.scene.lights.new_emitter import (
-    NewEmitter,
-    check_new_names,
-    moved_emitter,
-    places_of,
-)
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import TexelLayout
 from lightpaint.scene.plane_identity import SceneHasher
@@ -186,7 +181,7 @@ class Scene(SceneFiles, Shown):
     split: Mapping[str, GridSize | TexelLayout] = field(default_factory=dict)
     symmetric: frozenset[str] = frozenset()
     map_size: GridSize | None = None
-    added: tuple[NewEmitter, ...] = ()
+    added: tuple[new_emitter.NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
     points: MeasuringPoints | None = None
     is_spectral: bool = False
@@ -371,7 +366,7 @@ class Scene(SceneFiles, Shown):
             emitter = emitter_named(name, self.emitters, self.lights, scene=str(self.path))
             motion = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
             if emitter.name in added:
-                moved = moved_emitter(added[emitter.name], motion.site, motion.target)
+                moved = new_emitter.moved_emitter(added[emitter.name], motion.site, motion.target)
                 added[emitter.name] = moved
                 elements[emitter.name] = "".join(moved.lines())
             else:
@@ -384,10 +379,10 @@ class Scene(SceneFiles, Shown):
     @property
     def emitter_places(self) -> tuple[EmitterPlace, ...]:
         """Places of the emitters that have a position or a direction."""
-        return places_of(self.emitters, self.added, self.old_sites)
+        return new_emitter.places_of(self.emitters, self.added, self.old_sites)
 
     @MITSUBA.acquired()
-    def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
+    def with_new_emitters(self, emitters: Sequence[new_emitter.NewEmitter]) -> "Scene":
         """Return this scene with emitters added, each as a separate light.
 
         Nothing is written; `relight` writes their elements after all others, with the new
@@ -403,7 +398,7 @@ class Scene(SceneFiles, Shown):
             ['panel', 'bulb', 'key']
         """
         taken_names = {*(x.name for x in self.emitters), *(x.name for x in self.lights)}
-        check_new_names(emitters, taken_names, scene=str(self.path))
+        new_emitter.check_new_names(emitters, taken_names, scene=str(self.path))
         parsed = with_elements(self.parsed, {x.name: "".join(x.lines()) for x in emitters})
         extended = self._inspected(parsed, [x.name for x in emitters])
         return replace(extended, added=(*self.added, *emitters))

@@ -70,7 +70,7 @@ def test_what_is_kept_is_copied_rather_than_written_again(
     write_basis(path, basis)
     expected = path.read_bytes()
     written: list[Basis] = []
-    monkeypatch.setattr(basis_cache, "write_basis", lambda path, basis: written.append(basis))
+    monkeypatch.setattr(basis_file, "write_basis", lambda path, basis: written.append(basis))
     basis_cache.write_from_cache(path, basis)
     assert not written
     assert path.read_bytes() == expected

@@ -10,7 +10,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import as_singles, copy_as_singles, round_to_halves
-from lightpaint.basis.file import basis_file, file_parts, half_floats
+from lightpaint.basis.file import basis_file, half_floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file.file_parts import SCALE_KEY
 from lightpaint.basis.file.file_planes import FilePlanes, RowPlanes
@@ -239,7 +239,7 @@ def test_what_is_kept_is_rounded_once(
     rounded = []
     encode = half_floats.encode_pair
     monkeypatch.setattr(
-        file_parts,
+        half_floats,
         "encode_pair",
         lambda *arguments: rounded.append(len(arguments)) or encode(*arguments),
     )

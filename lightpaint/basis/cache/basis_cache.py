@@ -25,13 +25,7 @@ import numpy as np
 from platformdirs import user_cache_path
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.file.basis_file import (
-    FORMAT,
-    is_file_of,
-    read_basis,
-    read_origin,
-    write_basis,
-)
+from lightpaint.basis.file import basis_file
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, LightpaintError, OutputError
@@ -116,7 +110,7 @@ def read(entry: Entry) -> Basis | None:
 
 def _read(path: Path) -> Basis | None:
     try:
-        basis = read_basis(path)
+        basis = basis_file.read_basis(path)
         if path != _path_of(basis):
             raise BasisError(f"{path} is the basis of something else")
     except LightpaintError:
@@ -164,7 +158,7 @@ def keep(basis: Basis) -> bool:
         path = _path_of(basis)
         _mark_folder()
         _write_sums(basis)
-        write_basis(path, basis)
+        basis_file.write_basis(path, basis)
         for other in _companions_of(path):
             is_old = basis.sums is None or other != _sums_path(basis)
             if other.name.endswith(SUMS_SUFFIX) and is_old:
@@ -230,10 +224,10 @@ def write_from_cache(path: Path, basis: Basis) -> None:
             except FileNotFoundError as error:
                 raise _NotCachedError from error
             # The copy is checked, since another process may replace the file at any time.
-            if not is_file_of(temporary, basis):
+            if not basis_file.is_file_of(temporary, basis):
                 raise _NotCachedError
     except _NotCachedError:
-        write_basis(path, basis)
+        basis_file.write_basis(path, basis)
 
 
 class _NotCachedError(Exception):
@@ -329,7 +323,7 @@ def _names(entry: Entry) -> set[str]:
 
 def path_for(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:
     """Return the path of the basis for these arguments, whether or not it is cached."""
-    key = repr((FORMAT, scene_identity, sensor, seed, size))
+    key = repr((basis_file.FORMAT, scene_identity, sensor, seed, size))
     return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
 
 
@@ -341,7 +335,7 @@ def _path_of(basis: Basis) -> Path:
 def _entry(path: Path) -> Entry:
     size = sum(file.stat().st_size for file in (path, *_companions_of(path)))
     try:
-        origin, image_size, identities = read_origin(path)
+        origin, image_size, identities = basis_file.read_origin(path)
     except LightpaintError:
         return Entry(path, size, None)
     known_identities = frozenset(identities) - {""}

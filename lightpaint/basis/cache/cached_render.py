@@ -6,27 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.arrays import Indices
-from lightpaint.basis.cache import basis_cache
-from lightpaint.basis.cache.plane_reuse import (
-    as_sampled,
-    counts_of,
-    gather_planes,
-    least_sampled_lights,
-    mean_variance,
-    merge,
-    restrict,
-)
+from lightpaint.basis.cache import basis_cache, plane_reuse
 from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
 from lightpaint.basis.light_basis import Basis
+from lightpaint.basis.render import rendered_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.pixel_top_up import KeptTracer, top_up
-from lightpaint.basis.render.rendered_basis import (
-    ONE_PASS,
-    basis_lights,
-    is_of,
-    is_on_the_way,
-    method_of,
-)
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images import whole_factor
@@ -92,7 +77,9 @@ def obtain_basis(
         start = None
         if before is not None:
             options["keep"] = lambda basis: False
-            start = gather_planes(scene, None, spp=spp, seed=seed, before=before, use_cache=False)
+            start = plane_reuse.gather_planes(
+                scene, None, spp=spp, seed=seed, before=before, use_cache=False
+            )
         return as_stored(_completed(scene, start, as_clean_as, goal_spp, render, options))
     cached = _cached_basis(scene, seed)
     start = _starting_planes(
@@ -106,7 +93,7 @@ def obtain_basis(
 
     if start is not None:
         # A basis cached by an earlier version may know less about the same lights.
-        start = replace(start, lights=basis_lights(scene), source=str(scene.path))
+        start = replace(start, lights=rendered_basis.basis_lights(scene), source=str(scene.path))
         _report_reused(start, goal_spp, report_reuse)
     options |= {"keep": keep, "is_final": is_final}
     basis = _completed(scene, start, as_clean_as, goal_spp, render, options)
@@ -118,13 +105,13 @@ def obtain_basis(
 def _cached_basis(scene: Scene, seed: int) -> Basis | None:
     """Return the cached basis of the scene in its present state, if there is one."""
     cached = basis_cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
-    return cached if cached is not None and is_of(scene, cached, seed) else None
+    return cached if cached is not None and rendered_basis.is_of(scene, cached, seed) else None
 
 
 def _report_reused(start: Basis, goal_spp: int | None, report_reuse: ReuseReport) -> None:
     """Report how many lights need no more samples, if some do and others do not."""
     least = 1 if goal_spp is None else goal_spp
-    is_sufficient = [sum(counts[:2]) >= least for counts in counts_of(start)]
+    is_sufficient = [sum(counts[:2]) >= least for counts in plane_reuse.counts_of(start)]
     if 0 < sum(is_sufficient) < len(is_sufficient):
         report_reuse(sum(is_sufficient), len(is_sufficient))
 
@@ -148,12 +135,12 @@ def _starting_planes(
     if cached is not None and lacks_samples:
         start = replace(cached, sums=basis_cache.sums_of(cached))
     if exact_spp:
-        is_usable = start is not None and is_on_the_way(scene, start, goal_spp)
+        is_usable = start is not None and rendered_basis.is_on_the_way(scene, start, goal_spp)
         return start if is_usable else None
     if goal_spp is not None and lacks_samples:
-        return gather_planes(scene, start, spp=goal_spp, seed=seed, before=before)
+        return plane_reuse.gather_planes(scene, start, spp=goal_spp, seed=seed, before=before)
     if cached is None:
-        return gather_planes(scene, None, spp=None, seed=seed, before=before)
+        return plane_reuse.gather_planes(scene, None, spp=None, seed=seed, before=before)
     return start
 
 
@@ -199,23 +186,27 @@ def _completed(
         until |= {} if goal is None else {"until_spp": goal}
         return {"spp": None, "time_s": left_s} | until
 
-    while start is not None and method_of(scene) == ONE_PASS:
-        names, goal = least_sampled_lights(start, spp)
+    while start is not None and rendered_basis.method_of(scene) == rendered_basis.ONE_PASS:
+        names, goal = plane_reuse.least_sampled_lights(start, spp)
         if not names:
             break
         lights_scene, whole = scene.only(names), start
-        variance = None if goal is None else mean_variance(whole, goal)
+        variance = None if goal is None else plane_reuse.mean_variance(whole, goal)
 
         def keep(part: Basis, whole: Basis = whole) -> bool:
-            return bool(options["keep"](merge(scene, whole, part)))
+            return bool(options["keep"](plane_reuse.merge(scene, whole, part)))
 
         part_options = options | budget(goal, variance) | {"keep": keep}
-        part = render(lights_scene, start=restrict(whole, lights_scene), **part_options)
-        start = merge(scene, whole, as_sampled(part, goal, variance))
+        part = render(lights_scene, start=plane_reuse.restrict(whole, lights_scene), **part_options)
+        start = plane_reuse.merge(scene, whole, plane_reuse.as_sampled(part, goal, variance))
         if end_s is not None and time.monotonic() >= end_s:
             return start
-    variance = None if as_clean_as is None or spp is None else mean_variance(as_clean_as, spp)
-    return as_sampled(render(scene, start=start, **options | budget(spp, variance)), spp, variance)
+    variance = (
+        None if as_clean_as is None or spp is None else plane_reuse.mean_variance(as_clean_as, spp)
+    )
+    return plane_reuse.as_sampled(
+        render(scene, start=start, **options | budget(spp, variance)), spp, variance
+    )
 
 
 def _marked(basis: Basis, *, is_composed: bool) -> Basis:

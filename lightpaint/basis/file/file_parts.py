@@ -16,13 +16,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices
+from lightpaint.basis.file import half_floats
 from lightpaint.basis.file.deferred_planes import loaded
-from lightpaint.basis.file.half_floats import (
-    EncodedPlane,
-    EncodedPlanes,
-    encode_pair,
-    encoded_plane,
-)
 from lightpaint.basis.file.light_channels import PLANE_CHANNELS, has_indirect_channels, is_lit_part
 from lightpaint.basis.file.lit_parts import read_lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
@@ -124,16 +119,16 @@ def plane_sets(basis: Basis) -> list[Planes]:
     return sets
 
 
-def stored_planes_of(basis: Basis, k: int) -> list[EncodedPlane | LitPlane]:
+def stored_planes_of(basis: Basis, k: int) -> list[half_floats.EncodedPlane | LitPlane]:
     """Return the planes of light k as they are stored, in the order of `PLANE_CHANNELS`."""
     sets = [loaded(planes) for planes in plane_sets(basis)]
-    if all(isinstance(planes, EncodedPlanes | LitPlanes) for planes in sets):
-        return [x.stored(k) for x in sets if isinstance(x, EncodedPlanes | LitPlanes)]
+    if all(isinstance(planes, half_floats.EncodedPlanes | LitPlanes) for planes in sets):
+        return [x.stored(k) for x in sets if isinstance(x, half_floats.EncodedPlanes | LitPlanes)]
     planes = [plane_set.plane(k) for plane_set in sets]
     if len(basis.lights) >= MANY_LIGHTS and (rounded := round_to_noise(planes)) is not None:
         return [*rounded]
     pairs = zip(planes[::2], planes[1::2], strict=True)
-    return [encoded for pair in pairs for encoded in encode_pair(*pair)]
+    return [encoded for pair in pairs for encoded in half_floats.encode_pair(*pair)]
 
 
 def light_texts(light: BasisLight, scales: Sequence[float]) -> dict[str, str]:
@@ -147,7 +142,7 @@ def light_texts(light: BasisLight, scales: Sequence[float]) -> dict[str, str]:
     return texts
 
 
-def all_channels(planes: Sequence[EncodedPlane]) -> Channels:
+def all_channels(planes: Sequence[half_floats.EncodedPlane]) -> Channels:
     """Return the channels of a light with all pixels of its planes, in the order of
     `PLANE_CHANNELS`.
     """
@@ -187,7 +182,9 @@ def picture_size(part: ExrPart | PartLayout) -> tuple[int, int] | None:
     return display if is_whole else None
 
 
-def planes_of_part(part: ExrPart, scales: Sequence[float]) -> list[EncodedPlane | LitPlane]:
+def planes_of_part(
+    part: ExrPart, scales: Sequence[float]
+) -> list[half_floats.EncodedPlane | LitPlane]:
     """Return the planes of a light as they are stored, in the order of `PLANE_CHANNELS`.
 
     Raises BasisError if the part lacks channels, or is damaged.
@@ -199,7 +196,7 @@ def planes_of_part(part: ExrPart, scales: Sequence[float]) -> list[EncodedPlane 
         if name not in part.channels:
             raise BasisError(f"no channel {name} in part {part.name!r}")
     return [
-        encoded_plane([part.channels[name] for name in names], scale)
+        half_floats.encoded_plane([part.channels[name] for name in names], scale)
         for names, scale in zip(PLANE_CHANNELS[:count], scales, strict=False)
     ]
 

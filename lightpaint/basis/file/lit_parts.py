@@ -10,14 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lightpaint.basis.file import light_channels
 from lightpaint.basis.file.half_floats import HALF, EncodedPlane, PlaneEncoding
-from lightpaint.basis.file.light_channels import (
-    LIT_CHANNELS,
-    PREFIXES,
-    STEP,
-    lit_pixels,
-    noise_numbers,
-)
 from lightpaint.basis.file.lit_planes import LitPlane
 from lightpaint.basis.file.noise_rounding import noise_ratios
 from lightpaint.images.formats import Channels
@@ -72,8 +66,8 @@ def lit_channels(
     listed = np.zeros(rows * width, HALF)
     listed[:count] = MAX_STEP
     listed[places] = steps - MAX_STEP * (-(-steps // MAX_STEP) - 1)
-    channels = {STEP: listed.reshape(rows, width)}
-    for (image, noise), prefixes in zip(pairs, PREFIXES, strict=False):
+    channels = {light_channels.STEP: listed.reshape(rows, width)}
+    for (image, noise), prefixes in zip(pairs, light_channels.PREFIXES, strict=False):
         ratios = noise_ratios(image.numbers, noise.numbers)
         if ratios is None:
             return None
@@ -92,14 +86,16 @@ def read_lit_planes(
 
     Raises BasisError if it is damaged.
     """
-    pixels = lit_pixels(channels[STEP].reshape(-1), size)
+    pixels = light_channels.lit_pixels(channels[light_channels.STEP].reshape(-1), size)
     planes = []
-    has_indirect = channels.keys() >= LIT_CHANNELS
-    for k, (first, second) in enumerate(PREFIXES if has_indirect else PREFIXES[:1]):
+    has_indirect = channels.keys() >= light_channels.LIT_CHANNELS
+    for k, (first, second) in enumerate(
+        light_channels.PREFIXES if has_indirect else light_channels.PREFIXES[:1]
+    ):
         light, ratios = (
             np.stack([channels[prefix + c].reshape(-1)[: pixels.size] for c in "RGB"])
             for prefix in (first, second)
         )
         planes.append(LitPlane(pixels, light, scales[2 * k]))
-        planes.append(LitPlane(pixels, noise_numbers(light, ratios), scales[2 * k]))
+        planes.append(LitPlane(pixels, light_channels.noise_numbers(light, ratios), scales[2 * k]))
     return planes

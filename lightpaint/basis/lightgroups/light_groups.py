@@ -18,12 +18,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.light_basis import LIGHT_GROUPS, Basis, Origin
-from lightpaint.basis.lightgroups.beauty_comparison import (
-    NEGLIGIBLE_SHARE,
-    describe_sum,
-    missing_and_exceeding,
-    share_text,
-)
+from lightpaint.basis.lightgroups import beauty_comparison
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
 from lightpaint.basis.lightgroups.layer_roles import ONE_FILE_PER_LIGHT, Roles, roles_of
@@ -305,15 +300,18 @@ def missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> MissingLight:
         return MissingLight(None, None, None, text)
     whole = _without_holes(beauty.image, holes).astype(np.float64)
     rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
-    missing, exceeding = missing_and_exceeding(rest, whole)
+    missing, exceeding = beauty_comparison.missing_and_exceeding(rest, whole)
     name = free_name(REST_NAME, roles.lights)
     if roles.noisy is not None:
         text = (
             f"the groups add up to {roles.noisy.name}; what denoising changed in {beauty.name}, "
-            f"{share_text(max(missing, exceeding))} of its light, becomes the fixed light {name}"
+            f"{beauty_comparison.share_text(max(missing, exceeding))} of its light, becomes the "
+            f"fixed light {name}"
         )
         return MissingLight(rest, missing, exceeding, text)
-    text, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
+    text, is_missing = beauty_comparison.describe_sum(
+        rest, whole, [*lights, beauty], missing, exceeding, name
+    )
     setting = _setting(roles, "group")
     if is_missing and setting and missing > MIN_MISSING_SHARE and missing > exceeding:
         text += f"; a light in no group gets one by {setting}"
@@ -348,11 +346,11 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
     if not black:
         return []
     text = f"the file holds nothing of {some_names(black)}: black in every pixel, so fixed"
-    if missing is None or missing <= NEGLIGIBLE_SHARE:
+    if missing is None or missing <= beauty_comparison.NEGLIGIBLE_SHARE:
         return [f"{text}; is the light off, or the group renamed?"]
     return [
-        f"{text}; {share_text(missing)} of the light of the beauty is in no group: was the group "
-        "renamed after its lights were given it?"
+        f"{text}; {beauty_comparison.share_text(missing)} of the light of the beauty is in no "
+        "group: was the group renamed after its lights were given it?"
     ]
 
 

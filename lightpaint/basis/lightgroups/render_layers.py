@@ -22,22 +22,7 @@ from lightpaint.basis.lightgroups.naming_conventions import is_known, short_name
 from lightpaint.colour import are_same, converted, to_rec709
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images import HALF_DIFFERENCE, Objects
-from lightpaint.images.formats import (
-    ALPHA_NAMES,
-    KRITA_LAYERS,
-    OWN_PREFIX,
-    ExrPart,
-    channel_named,
-    colour_channels,
-    head_of,
-    kind_of,
-    primaries_of,
-    read_channels,
-    read_headers,
-    read_parts,
-    vector_channels,
-)
+from lightpaint.images import HALF_DIFFERENCE, Objects, formats
 
 #: Maximum number of files in a folder of light groups: more are probably frames of a film.
 MAX_FILES = 1000
@@ -170,19 +155,19 @@ def _joined_layers(contents: Mapping[Path, RenderFile]) -> list[RenderLayer]:
 
 
 def _content(path: Path) -> RenderFile:
-    parts = [part.in_display_window() for part in read_parts(path)]
+    parts = [part.in_display_window() for part in formats.read_parts(path)]
     mattes = declared_mattes(parts)
     objects, remarks = objects_of(parts, mattes, path)
     layers = []
     for part in parts:
         primaries = _primaries(path, part)
-        colours = colour_channels(part.channels)
-        vectors = vector_channels(part.channels)
+        colours = formats.colour_channels(part.channels)
+        vectors = formats.vector_channels(part.channels)
         for prefix, channels in [*colours.items(), *vectors.items()]:
             if any(matte.is_layer(prefix or part.name) for matte in mattes):
                 continue
             image = _rgb(path, part.channels, channels)
-            alpha = channel_named(part.channels, prefix, *ALPHA_NAMES)
+            alpha = formats.channel_named(part.channels, prefix, *formats.ALPHA_NAMES)
             other_names = [part.name, f"{part.name}.{prefix}"]
             if len(parts) == 1 and not prefix:
                 other_names += [
@@ -215,10 +200,10 @@ def _is_exact(compression: str, image: Floats) -> bool:
     return not is_half if compression.startswith("B44") else is_half and compression == "PXR24"
 
 
-def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
+def _primaries(path: Path, part: formats.ExrPart) -> tuple[float, ...] | None:
     """Return the declared primaries, None for Rec.709. Raises ImageError if they are invalid."""
     try:
-        return primaries_of(part)
+        return formats.primaries_of(part)
     except ImageError as error:
         raise ImageError(path, " ", error) from None
 
@@ -252,12 +237,12 @@ def is_exr(path: Path) -> bool:
 
     May raise ImageError.
     """
-    return path.is_file() and kind_of(head_of(path, 16)) == "exr"
+    return path.is_file() and formats.kind_of(formats.head_of(path, 16)) == "exr"
 
 
 def is_own_basis(path: Path) -> bool:
     """Return True if an EXR is lightpaint's own basis. Raises ImageError if it is unreadable."""
-    return any(FORMAT_KEY in header for header in read_headers(path)[0])
+    return any(FORMAT_KEY in header for header in formats.read_headers(path)[0])
 
 
 def _candidate_files(
@@ -318,15 +303,15 @@ def _reason_against(file: Path, others: Sequence[Path]) -> str:
     if any(_is_same(file, other) for other in others):
         return "painting or mask"
     try:
-        headers, _ = read_headers(file)
-        channels = read_channels(file)
+        headers, _ = formats.read_headers(file)
+        channels = formats.read_channels(file)
     except ImageError:
         return ""  # Reading it reports the error.
-    if any(key.startswith(OWN_PREFIX) for header in headers for key in header):
+    if any(key.startswith(formats.OWN_PREFIX) for header in headers for key in header):
         return "made by lightpaint"
     if any(name.startswith(f"{HALF_DIFFERENCE}.") for name in channels):
         return "made by lightpaint"
-    if any(KRITA_LAYERS in header for header in headers):
+    if any(formats.KRITA_LAYERS in header for header in headers):
         return "painted in Krita"
     return "a painting, with weights W" if "W" in channels else ""
 

@@ -13,23 +13,8 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.arrays import Floats
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.banded_film import (
-    BandedFilm,
-    WholeFilm,
-    check_memory,
-    renders_in_bands,
-)
+from lightpaint.basis.render import banded_film, rendered_basis
 from lightpaint.basis.render.render_budget import Budget, Keeper, check_samples, steps
-from lightpaint.basis.render.rendered_basis import (
-    ONE_PASS,
-    SEPARATE,
-    basis_lights,
-    basis_of_planes,
-    basis_of_sums,
-    is_of,
-    method_of,
-    origin_of,
-)
 from lightpaint.basis.render.separate_renders import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
@@ -99,21 +84,21 @@ def render_basis(
     check_samples(spp=spp, until_spp=until_spp, seed=seed)
     budget = Budget(scene.spp if spp is None else spp, time_s, until_spp, until_variance)
     check_size(scene)
-    if start is not None and not is_of(scene, start, seed):
+    if start is not None and not rendered_basis.is_of(scene, start, seed):
         raise BasisError("the basis to continue was made from another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
-    check_memory(scene, in_bands=renders_in_bands(scene, start))
-    method = method_of(scene)
+    banded_film.check_memory(scene, in_bands=banded_film.renders_in_bands(scene, start))
+    method = rendered_basis.method_of(scene)
     if start is not None and start.origin.method != method:
         # It cannot be continued, but must not be replaced by a basis with fewer samples either.
         start, keep = None, None
-    if start is not None and method == ONE_PASS:
+    if start is not None and method == rendered_basis.ONE_PASS:
         _check_equal_samples(start)
     has_first_hits = start is not None and _has_first_hits(start)
     arguments = scene, budget, seed, start, Keeper(keep), progress
     with render_errors(scene.path):
-        if method == ONE_PASS:
+        if method == rendered_basis.ONE_PASS:
             rendered = _render_together(
                 *arguments, is_final=is_final, needs_first_hits=not has_first_hits
             )
@@ -220,8 +205,14 @@ class _OnePassRender:
         sums = None if start is None else start.sums
         # The samples that are not in the initial sums.
         self._rest = start if sums is None else None
-        film_type = BandedFilm if renders_in_bands(scene, start) else WholeFilm
-        self._film: WholeFilm | BandedFilm = film_type(self.tracer, self.done, sums)
+        film_type = (
+            banded_film.BandedFilm
+            if banded_film.renders_in_bands(scene, start)
+            else banded_film.WholeFilm
+        )
+        self._film: banded_film.WholeFilm | banded_film.BandedFilm = film_type(
+            self.tracer, self.done, sums
+        )
 
     def spend(self, budget: Budget, keeper: Keeper, progress: Progress) -> None:
         """Add samples step by step until `budget` is spent."""
@@ -251,14 +242,16 @@ class _OnePassRender:
         seen = film.seen()
         if self._start is not None:
             seen |= self._start.emitters_seen
-        if isinstance(film, BandedFilm):
+        if isinstance(film, banded_film.BandedFilm):
             of_render = scene, seed, seen, self.done, table
             sums = None if is_finished else (film.sums.array[0], film.sums.array[1])
             pairs = film.planes(self.done)
-            return basis_of_planes(pairs, *of_render, is_finished=is_finished, sums=sums)
+            return rendered_basis.basis_of_planes(
+                pairs, *of_render, is_finished=is_finished, sums=sums
+            )
         halves, start = film.sums(is_last=is_last), self._rest
         of_sums = scene, seed, halves, seen, self.done, table
-        return basis_of_sums(*of_sums, start=start, is_finished=is_finished)
+        return rendered_basis.basis_of_sums(*of_sums, start=start, is_finished=is_finished)
 
 
 @MITSUBA.acquired()
@@ -277,12 +270,12 @@ def _render_one_by_one(
     """
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
-    nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))
+    nothing = rendered_basis.origin_of(scene, seed, rendered_basis.SEPARATE, (0, 0), (0, 0))
 
     def basis(*, is_finished: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
-        lights = basis_lights(scene)
+        lights = rendered_basis.basis_lights(scene)
         source = str(scene.path)
         kept_sums = None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy())
         planes = as_planes(images), as_planes(half_differences)

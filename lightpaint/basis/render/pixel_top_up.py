@@ -17,16 +17,11 @@ import numpy as np
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
+from lightpaint.basis.render import rendered_basis
 from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
 from lightpaint.basis.render.render_budget import PASS_DIVISOR
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
-from lightpaint.basis.render.rendered_basis import (
-    ONE_PASS,
-    add_halves,
-    is_of,
-    mean_and_half_difference,
-)
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene import Scene, largest_pass, view_seed
@@ -110,7 +105,9 @@ def top_up(
     early; returns whether it was stored. tracers: from `kept_loaded`, to keep the scene loaded.
     Raises BasisError if the basis does not belong to the scene, and Interrupted on Ctrl-C.
     """
-    if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
+    if basis.origin.method != rendered_basis.ONE_PASS or not rendered_basis.is_of(
+        scene, basis, basis.origin.seed
+    ):
         raise BasisError("the basis to top up is not a one-pass basis of this scene and film")
     sums = _PlaneSums(scene, basis)
     batches = list(pixel_batches(counts, 2 * plane_count(scene)))
@@ -217,9 +214,9 @@ class _PlaneSums:
                 old_planes = [
                     as_planes(flat(plane[k : k + 1])[:, pixels][:, None]) for plane in pair
                 ]
-                add_halves(light_halves, old_planes[0], old_planes[1], old)
+                rendered_basis.add_halves(light_halves, old_planes[0], old_planes[1], old)
                 for plane, updated in zip(
-                    pair, mean_and_half_difference(light_halves, new), strict=True
+                    pair, rendered_basis.mean_and_half_difference(light_halves, new), strict=True
                 ):
                     flat(plane)[k, pixels] = updated[0, 0]
         self.extra.ravel()[pixels] += spp

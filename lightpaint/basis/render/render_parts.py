@@ -18,6 +18,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import as_planes
+from lightpaint.basis.render import rendered_basis, separate_renders
 from lightpaint.basis.render.banded_film import (
     FileSums,
     planes_of_sums,
@@ -26,20 +27,6 @@ from lightpaint.basis.render.banded_film import (
 from lightpaint.basis.render.basis_render import with_first_hits
 from lightpaint.basis.render.integrators import plane_count
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, half_of
-from lightpaint.basis.render.rendered_basis import (
-    ONE_PASS,
-    basis_lights,
-    basis_of_planes,
-    basis_of_sums,
-    method_of,
-    origin_of,
-)
-from lightpaint.basis.render.separate_renders import (
-    LightSums,
-    emitters_seen,
-    light_pass,
-    plan_of_light,
-)
 from lightpaint.scene import SAMPLES_PER_PASS, Scene, largest_pass, view_seed
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 
@@ -82,7 +69,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
     start: an existing basis whose samples count.
     """
     height, width = scene.size
-    if method_of(scene) != ONE_PASS:
+    if rendered_basis.method_of(scene) != rendered_basis.ONE_PASS:
         return _separate_parts(scene, spp, start)
     done = 0 if start is None else start.origin.halves[0]
     remainder = half_of(spp) - done
@@ -99,11 +86,15 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
 def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
     """Return the passes of each light, numbered from the first pass of `start`."""
     height, _ = scene.size
-    sums = LightSums(len(scene.lights), (0, 0)) if start is None else LightSums.counted(start)
+    sums = (
+        separate_renders.LightSums(len(scene.lights), (0, 0))
+        if start is None
+        else separate_renders.LightSums.counted(start)
+    )
     parts = []
     for light in range(len(scene.lights)):
         done, numbers = list(sums.done(light)), sums.passes[light].tolist()
-        for half, pass_spp in plan_of_light(scene, spp, done=(done[0], done[1])):
+        for half, pass_spp in separate_renders.plan_of_light(scene, spp, done=(done[0], done[1])):
             parts.append(Part(0, height, done[half], pass_spp, light, half, numbers[half]))
             done[half] += pass_spp
             numbers[half] += 1
@@ -165,7 +156,7 @@ class PartRenderer:
         assert part.half is not None
         which = light, part.half, part.number, part.spp, self._seed
         with tracing():
-            image = light_pass(self._loaded, self._scene, *which)
+            image = separate_renders.light_pass(self._loaded, self._scene, *which)
         return image[None, None], np.zeros((1, *self._scene.size), np.float32)
 
     def close(self) -> None:
@@ -188,7 +179,7 @@ class PartSums:
         self._scene, self._seed, self._start = scene, seed, start
         self._left = set(parts)
         self._lights: LightPasses | None = None
-        if method_of(scene) != ONE_PASS:
+        if rendered_basis.method_of(scene) != rendered_basis.ONE_PASS:
             self._lights = LightPasses(scene, parts, start)
             return
         self._half = 0 if start is None else start.origin.halves[0]
@@ -231,10 +222,12 @@ class PartSums:
         elif isinstance(self._halves, FileSums):
             pairs = planes_of_sums(self._halves, len(scene.lights), self._half)
             of_render = scene, self._seed, self._seen > 0, self._half, guide_table
-            start_basis = basis_of_planes(pairs, *of_render, is_finished=True, sums=None)
+            start_basis = rendered_basis.basis_of_planes(
+                pairs, *of_render, is_finished=True, sums=None
+            )
         else:
             halves, seen = list(self._halves), self._seen > 0
-            start_basis = basis_of_sums(
+            start_basis = rendered_basis.basis_of_sums(
                 scene, self._seed, halves, seen, self._half, guide_table, start=start
             )
         if start is not None:
@@ -248,7 +241,11 @@ class LightPasses:
     def __init__(self, scene: Scene, parts: Sequence[Part], start: Basis | None) -> None:
         self._scene, self._start = scene, start
         n = len(scene.lights)
-        self._sums = LightSums(n, scene.size) if start is None else LightSums.of(start)
+        self._sums = (
+            separate_renders.LightSums(n, scene.size)
+            if start is None
+            else separate_renders.LightSums.of(start)
+        )
         self._next: dict[tuple[int, int], list[Part]] = defaultdict(list)
         for part in sorted(parts, key=lambda part: part.first):
             self._next[part.place].append(part)
@@ -269,10 +266,12 @@ class LightPasses:
         """Return the basis after all passes were added."""
         scene, start = self._scene, self._start
         images, half_differences = self._sums.mean_and_half_difference()
-        seen = emitters_seen(scene) if start is None else start.emitters_seen
-        origin = origin_of(scene, seed, method_of(scene), (0, 0), (0, 0))
+        seen = separate_renders.emitters_seen(scene) if start is None else start.emitters_seen
+        origin = rendered_basis.origin_of(
+            scene, seed, rendered_basis.method_of(scene), (0, 0), (0, 0)
+        )
         return Basis(
-            basis_lights(scene),
+            rendered_basis.basis_lights(scene),
             as_planes(images),
             as_planes(half_differences),
             seen,

@@ -12,13 +12,7 @@ from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.basis.render import basis_of_sums, train_guide
 from lightpaint.batch.manifest.keys import Space, as_key, shift
 from lightpaint.batch.manifest.sequence import interpolate
-from lightpaint.batch.work import work_items
-from lightpaint.batch.work.derived_looks import (
-    derived_folder,
-    dimmer_lights,
-    measure_derived,
-    publish_derived,
-)
+from lightpaint.batch.work import derived_looks, work_items
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
@@ -151,13 +145,13 @@ def _derive_answer(
         bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     lighting = derive_lighting(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
-        lighting = shift(lighting, task.mireds, dimmer_lights(bases[0]))
+        lighting = shift(lighting, task.mireds, derived_looks.dimmer_lights(bases[0]))
     scale = settings.cd_per_unit or lighting.cd_per_unit
     lighting = replace(lighting.for_target(task.look), cd_per_unit=scale)
     views = pipeline.view_names(scenes) if fields["by_sensor"] else [""]
     scene = scenes[0] if scenes else None
     options: dict[str, Any] = {"views": views, "groups": groups}
-    results = derived_folder(
+    results = derived_looks.derived_folder(
         fields["folder"],
         scene,
         task.lightings,
@@ -165,8 +159,12 @@ def _derive_answer(
         planes=settings.planes,
         force=settings.force,
     )
-    options["planes"] = measure_derived(scene, lighting, fields["constraints"], settings, listen)
-    publish_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
+    options["planes"] = derived_looks.measure_derived(
+        scene, lighting, fields["constraints"], settings, listen
+    )
+    derived_looks.publish_derived(
+        results, lighting, bases, **options, scene=scene, spp=settings.spp
+    )
 
 
 def derive_lighting(

@@ -9,19 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lightpaint import colour
 from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
-from lightpaint.colour import (
-    ColorRendering,
-    Lamp,
-    adapted_color,
-    ciede2000,
-    color_rendering,
-    fidelity,
-    lab,
-    luminance,
-    white_of,
-    xyz_of_powers,
-)
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.solution import Solution
 
@@ -47,7 +36,7 @@ class LightRendering:
     if another was chosen since. held_mix_change: as in `LightSetting`.
     """
 
-    color: ColorRendering | None
+    color: colour.ColorRendering | None
     best_rf: float | None
     lm_per_w: float | None
     watts: float | None = None
@@ -73,10 +62,10 @@ def _rendering(lighting: Lighting, light: LightSetting, *, is_searched: bool) ->
     assert light.powers is not None
     assert lamp.powers_at_full is not None
     emission, drives = np.array(light.emission), np.array([*light.drives.values()])
-    color, best, watts = color_rendering(light.powers), None, _watts(lamp, drives)
+    color, best, watts = colour.color_rendering(light.powers), None, _watts(lamp, drives)
     if color is not None and (is_searched or lamp.searches_rendering):
         mix = lamp.best_rendering(emission)
-        best = max(color.rf, fidelity(mix @ lamp.powers_at_full))
+        best = max(color.rf, colour.fidelity(mix @ lamp.powers_at_full))
     lumens, lm_per_w = lighting.photometry(light).flux_lm, None
     if lumens is not None and watts is not None:
         lm_per_w = lumens / watts if watts > 0 else None
@@ -92,11 +81,13 @@ def _rendering(lighting: Lighting, light: LightSetting, *, is_searched: bool) ->
         return found
     plain = np.array(light.solved_mix or lamp.while_painting.drives_for(emission))
     return replace(
-        found, plain_rf=fidelity(plain @ lamp.powers_at_full), plain_watts=_watts(lamp, plain)
+        found,
+        plain_rf=colour.fidelity(plain @ lamp.powers_at_full),
+        plain_watts=_watts(lamp, plain),
     )
 
 
-def _watts(lamp: Lamp, drives: Doubles) -> float | None:
+def _watts(lamp: colour.Lamp, drives: Doubles) -> float | None:
     """Return the power of drives (e,); None if the power of an emitter is unknown."""
     known = [x.watts for x in lamp.emitters if x.watts is not None]
     return float(drives @ np.array(known)) if len(known) == len(lamp.emitters) else None
@@ -131,10 +122,13 @@ def surface_colors(
     spectra = np.array([_spectrum(light, daylight) for light in solution.lighting.lights])
     found = []
     for k, reflectance in reflectances.items():
-        if xyz_of_powers(daylight * reflectance)[1] < DARKEST * xyz_of_powers(daylight)[1]:
+        if (
+            colour.xyz_of_powers(daylight * reflectance)[1]
+            < DARKEST * colour.xyz_of_powers(daylight)[1]
+        ):
             continue
         shares = _luminance_by_light(solution, objects.index == k)
-        of_surface = np.array([xyz_of_powers(x * reflectance)[1] for x in spectra])
+        of_surface = np.array([colour.xyz_of_powers(x * reflectance)[1] for x in spectra])
         light = np.divide(shares, of_surface, out=0 * shares, where=of_surface > 0) @ spectra
         found.append(_color_of(objects.names[k], reflectance, np.maximum(light, 0), daylight))
     return tuple(sorted(found, key=lambda x: -(x.delta_e or 0)))
@@ -153,12 +147,17 @@ def _luminance_by_light(solution: Solution, mask: Bools) -> Doubles:
     pixels = np.flatnonzero(mask)
     pixels = pixels[:: max(1, len(pixels) // MAX_PIXELS)]
     seen = solution.basis.planes.pixels(pixels).mean(axis=1, dtype=np.float64)
-    return np.asarray(luminance(seen * solution.weights), np.float64)
+    return np.asarray(colour.luminance(seen * solution.weights), np.float64)
 
 
 def _color_of(name: str, reflectance: Doubles, light: Doubles, daylight: Doubles) -> SurfaceColor:
-    shown = adapted_color(daylight, reflectance)
-    if not light.any() or white_of(light) is None:
+    shown = colour.adapted_color(daylight, reflectance)
+    if not light.any() or colour.white_of(light) is None:
         return SurfaceColor(name, as_rgb(shown), None, None)
-    seen = adapted_color(light, reflectance)
-    return SurfaceColor(name, as_rgb(shown), as_rgb(seen), float(ciede2000(lab(shown), lab(seen))))
+    seen = colour.adapted_color(light, reflectance)
+    return SurfaceColor(
+        name,
+        as_rgb(shown),
+        as_rgb(seen),
+        float(colour.ciede2000(colour.lab(shown), colour.lab(seen))),
+    )

@@ -15,13 +15,7 @@ from lightpaint.colour import Preference, SlotFilter, WhiteRange
 from lightpaint.display_text import brief, some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints import values
-from lightpaint.lighting.constraints.emitter_values import (
-    EmitterRequest,
-    has_slots,
-    parse_emitters,
-    parse_slots,
-)
+from lightpaint.lighting.constraints import emitter_values, values
 from lightpaint.sentences import Sentence, SourceKey
 from lightpaint.validation import MAX_LISTED
 
@@ -86,7 +80,7 @@ class LightConstraint:
     most: values.Level | None = None
     primaries: tuple[RGB, ...] | None = None
     whites: WhiteRange | None = None
-    emitters: tuple[EmitterRequest, ...] = ()
+    emitters: tuple[emitter_values.EmitterRequest, ...] = ()
     power_share: float | None = None
     wheel: bool | str = False
     least_rf: float | None = None
@@ -125,7 +119,7 @@ class LightConstraint:
         )
         primaries = values.parse_primaries(table, key)
         whites = values.parse_whites(table, key)
-        emitters = parse_emitters(table, key)
+        emitters = emitter_values.parse_emitters(table, key)
         share, least_rf = values.parse_power_share(table, key), values.parse_rf(table, key)
         _check_emitters(table, key, primaries)
         if lock is not None and primaries is not None:
@@ -146,7 +140,7 @@ class LightConstraint:
             lock, primaries = values.Lock(lock.level, primaries[0]), None
         wheel = values.parse_wheel(table, key, [x.name for x in emitters])
         is_off, label = "off" in table, _label(table)
-        lamp = emitters, share, wheel, least_rf, parse_slots(table, key)
+        lamp = emitters, share, wheel, least_rf, emitter_values.parse_slots(table, key)
         return cls(lock, is_off, least, most, primaries, whites, *lamp, label, key)
 
 
@@ -161,7 +155,7 @@ def _check_emitters(
             raise ConstraintError(where, " has wheel without emitters, which are its slots")
         return
     mixing = {"power_share": "power_share" in table, "kelvin": len(primaries or ()) > 1}
-    if "wheel" in table and not has_slots(table) and any(mixing.values()):
+    if "wheel" in table and not emitter_values.has_slots(table) and any(mixing.values()):
         key = next(key for key, is_there in mixing.items() if is_there)
         raise ConstraintError(
             where, f" has wheel and {key}, and a wheel shows one slot at a time: leave {key} out"

@@ -26,6 +26,7 @@ from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis import Basis, texel_lights
 from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.display_text import short_repr
+from lightpaint.lighting import linear_problem
 from lightpaint.lighting.analysis.appearance.held_answer import closest_to_paint, holding_pull
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
@@ -33,12 +34,6 @@ from lightpaint.lighting.constraints.light_constraints import (
     start_weights,
 )
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.linear_problem import (
-    PaintReading,
-    SummedProblem,
-    reduce_lights,
-    whites_for,
-)
 from lightpaint.lighting.linear_solve import at_slots, solve_linear
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveDifference, LiveView
@@ -52,17 +47,11 @@ from lightpaint.lighting.loss.weight_penalty import (
     pull_to_current,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns import white_mixes
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, light_of_emitters_seen
 from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_mixes import (
-    Multipliers,
-    center_windows,
-    clip_to_gamuts,
-    snap_to_whites,
-    solve_on_locus,
-)
 from lightpaint.threads import one_thread
 
 #: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
@@ -83,7 +72,7 @@ GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
 
 
 @dataclass(frozen=True, kw_only=True)
-class LiveProblem(SummedProblem):
+class LiveProblem(linear_problem.SummedProblem):
     """The linear problem of live views, whose squares follow the brush.
 
     painted_share: see `LinearProblem`. full: what constraints leave; reduction: that with the
@@ -128,7 +117,7 @@ class _Improved:
     weights: Doubles
 
 
-class LiveReading(PaintReading):
+class LiveReading(linear_problem.PaintReading):
     """The demands of live views on their lights, read anew as they are painted.
 
     films: of the views, together. problem: has lights, reference and fit.
@@ -223,7 +212,7 @@ class LiveSolver:
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         lights = self._basis.lights
-        reduction = reduce_lights(constraints, lights, fit)
+        reduction = linear_problem.reduce_lights(constraints, lights, fit)
         self._problem = LiveProblem(
             name="",
             lights=lights,
@@ -240,7 +229,7 @@ class LiveSolver:
         self._mixed_emissions: Mapping[int, RGB] = {}
         self._reading: LiveReading | None = None
         self._answers_left = 0
-        self._near = Multipliers(MET_UNDER_BRUSH)
+        self._near = white_mixes.Multipliers(MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
         self._given_up: NormalEquations | None = None  # contrasts that lights cannot bring
         self._last_free: Doubles | None = None  # the last answer without a hold, while one holds
@@ -483,7 +472,7 @@ class LiveSolver:
             painted_share=reading.importance / sum(view.pixels for view in views),
             **vars(terms),
         )
-        self._follow_whites(whites_for(terms.expected, self._problem.fit))
+        self._follow_whites(linear_problem.whites_for(terms.expected, self._problem.fit))
         # Lights that the last answer confined to their gamuts are confined from the start.
         if (known := self._problem.reduction.gamuts) is not None and not is_new:
             known.refresh()
@@ -496,7 +485,9 @@ class LiveSolver:
         if whites in (None, self._whites):
             return
         problem = self._problem
-        reduction = reduce_lights(problem.constraints, problem.lights, problem.fit, whites=whites)
+        reduction = linear_problem.reduce_lights(
+            problem.constraints, problem.lights, problem.fit, whites=whites
+        )
         self._whites = whites
         self._problem = replace(problem, reduction=reduction, full=reduction)
 
@@ -505,7 +496,7 @@ class LiveSolver:
     ) -> tuple[Reduction, Doubles]:
         """Solve for some of many lights, whose misses of requirements would add up over rounds."""
         method = self._problem.fit.method
-        reduction, optimum = solve_on_locus(
+        reduction, optimum = white_mixes.solve_on_locus(
             equations, reduction, start, steps=BRUSH_STEPS, method=method
         )
         return reduction, optimum.weights
@@ -530,7 +521,7 @@ class LiveSolver:
 
 def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
-    return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
+    return white_mixes.clip_to_gamuts(reduction, white_mixes.snap_to_whites(reduction, weights))
 
 
 def _no_squares(count: int) -> NormalEquations:
@@ -556,8 +547,8 @@ def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) 
 
     Lights with a range of white get its nearest white, at the same brightness.
     """
-    weights = snap_to_whites(reduction, weights)
-    reduction = center_windows(reduction, weights)
+    weights = white_mixes.snap_to_whites(reduction, weights)
+    reduction = white_mixes.center_windows(reduction, weights)
     allowed = nearest_weights(reduction, weights)
     if reduction.requirements is None and np.allclose(allowed, weights, rtol=ROUND_OFF, atol=0):
         return allowed  # without a solve, which takes a second for a thousand lights

@@ -12,13 +12,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.lighting.analysis.appearance.delivery import ViewPictures, have_wishes_come
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.light_constraints import held_at_start
-from lightpaint.lighting.live.live_sums import (
-    MAX_FILM_PIXELS,
-    AtLeast,
-    LayerWishes,
-    PaintedTiles,
-    SmallFilm,
-)
+from lightpaint.lighting.live import live_sums
 from lightpaint.lighting.loss.painting import affected_region, dark_threshold, find_glow_paint
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 from lightpaint.target import Target
@@ -43,8 +37,8 @@ class LiveView:
         basis: Basis,
         image: Floats,
         importance: Floats,
-        layers: LayerWishes = lambda _side: (),
-        at_least: AtLeast = lambda: None,
+        layers: live_sums.LayerWishes = lambda _side: (),
+        at_least: live_sums.AtLeast = lambda: None,
     ) -> None:
         self._own_basis, self._start = basis, dict[str, RGB]()
         self.basis, self._image, self._importance = basis, image, importance
@@ -55,8 +49,8 @@ class LiveView:
         self._read((slice(0, len(importance)), slice(0, importance.shape[1])))
         self._sums = np.zeros((len(importance), -(-importance.shape[1] // SEGMENT_PIXELS), 2))
         self._count((slice(0, len(importance)), slice(0, importance.shape[1])))
-        self._light: PaintedTiles | None = None
-        self._display: SmallFilm | None = None
+        self._light: live_sums.PaintedTiles | None = None
+        self._display: live_sums.SmallFilm | None = None
 
     @property
     def counts(self) -> Doubles:
@@ -113,10 +107,10 @@ class LiveView:
             self.basis = held_at_start(self._own_basis, self._start)
             self._light, self._display = None, None
 
-    def tiles(self) -> PaintedTiles:
+    def tiles(self) -> live_sums.PaintedTiles:
         """Return the sums in linear light."""
         if self._light is None:
-            self._light = PaintedTiles(self.basis, self._image, self._counted)
+            self._light = live_sums.PaintedTiles(self.basis, self._image, self._counted)
         return self._light
 
     @property
@@ -124,10 +118,12 @@ class LiveView:
         """True once `film` has averaged the picture."""
         return self._display is not None
 
-    def film(self, transform: ViewTransform | None, max_pixels: int = MAX_FILM_PIXELS) -> SmallFilm:
+    def film(
+        self, transform: ViewTransform | None, max_pixels: int = live_sums.MAX_FILM_PIXELS
+    ) -> live_sums.SmallFilm:
         """Return the picture in display space, of `max_pixels` at most."""
         if self._display is None:
-            self._display = SmallFilm(
+            self._display = live_sums.SmallFilm(
                 self.basis, self._image, self._counted, max_pixels, self._at_least
             )
             self._display.set_transform(transform)
@@ -214,8 +210,8 @@ class LiveDifference:
     None in linear light.
     """
 
-    films: Sequence[SmallFilm]
-    layers: Sequence[LayerWishes]
+    films: Sequence[live_sums.SmallFilm]
+    layers: Sequence[live_sums.LayerWishes]
     display: ViewTransform
     compared: ViewTransform | None
 
@@ -255,7 +251,9 @@ class LiveDifference:
         return have_wishes_come(views, self.display)
 
 
-def _painted_view(film: SmallFilm, layers: LayerWishes, picture: Doubles) -> ViewPictures:
+def _painted_view(
+    film: live_sums.SmallFilm, layers: live_sums.LayerWishes, picture: Doubles
+) -> ViewPictures:
     """Return a film as a view with a painting. picture: (3, p), of the answer."""
     size = film.size
     painted, weight, marks = film.paint

@@ -16,12 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.clipped_newton import (
-    MANY_UNKNOWNS,
-    RIDGE,
-    is_suspect,
-    solve_ridged,
-)
+from lightpaint.lighting.algebra import clipped_newton
 from lightpaint.lighting.algebra.free_factor import KEPT_PROMISE, SHORTEST_PART
 from lightpaint.lighting.algebra.optimum import NO_CAPS, Optimum
 from lightpaint.lighting.algebra.quadratic import EPSILON, UNREACHED_POWER, kkt_step
@@ -186,7 +181,7 @@ class _Steps:
                 most = tolerance
                 if residual > most:
                     most = max(most, self._round_off(point.w, scale) / size)
-                if residual > most or any(is_suspect(matrix) for matrix in systems):
+                if residual > most or any(clipped_newton.is_suspect(matrix) for matrix in systems):
                     return None
                 return Optimum(point.x, slope * scale, NO_CAPS, residual, 0, step, most)
             point = lower
@@ -332,9 +327,11 @@ class _Steps:
             coupling = None if self.coupling is None else self.coupling[rest]
             inverse = 1 / np.sqrt(self.power[chosen])
             matrix = block.matrix(part.rest, coupling) * inverse * inverse[:, None]
-            matrix.flat[:: len(matrix) + 1] += RIDGE * len(matrix) ** 0.5
+            matrix.flat[:: len(matrix) + 1] += clipped_newton.RIDGE * len(matrix) ** 0.5
             right = block.right_side(part.right) * inverse
-            turns[chosen] = inverse * solve_ridged(matrix, right[:, None], len(matrix))[:, 0]
+            turns[chosen] = (
+                inverse * clipped_newton.solve_ridged(matrix, right[:, None], len(matrix))[:, 0]
+            )
             np.add.at(moves, light[entry], turns[unknown[entry], None] * columns)
             systems.append(matrix)
         moves[whole] = part.step(moves[rest])
@@ -386,12 +383,14 @@ class _Eliminated:
         """
         rows, count = M[:, whole], whole.size
         matrix, across = rows[:, :, whole], rows[:, :, rest]
-        matrix[:, np.arange(count), np.arange(count)] += RIDGE * count**0.5
+        matrix[:, np.arange(count), np.arange(count)] += clipped_newton.RIDGE * count**0.5
         right = np.concatenate([-gradient[whole].T[:, :, None], across], axis=2)
-        if count > MANY_UNKNOWNS:
-            solved = np.stack([solve_ridged(*x, count) for x in zip(matrix, right, strict=True)])
+        if count > clipped_newton.MANY_UNKNOWNS:
+            solved = np.stack(
+                [clipped_newton.solve_ridged(*x, count) for x in zip(matrix, right, strict=True)]
+            )
         else:
-            solved = solve_ridged(matrix, right, count)
+            solved = clipped_newton.solve_ridged(matrix, right, count)
         pushed = np.matmul(across.swapaxes(1, 2), solved)
         remaining = M[:, rest][:, :, rest] - pushed[:, :, 1:]
         return cls(

@@ -8,24 +8,8 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
+from lightpaint.paint import protocol
 from lightpaint.paint.message_frames import from_frame, is_other_version, parse_request, to_frame
-from lightpaint.paint.protocol import (
-    AnswerUpdate,
-    Closing,
-    DraggedPlane,
-    EditState,
-    Failure,
-    Hello,
-    LookList,
-    Message,
-    MixedPicture,
-    Paint,
-    PictureUpdate,
-    ProgressReport,
-    Request,
-    SessionState,
-    TakeOver,
-)
 
 #: Largest number of queued messages of a page, and of their bytes, before its socket is read on.
 MAX_QUEUED, MAX_QUEUED_BYTES = 64, 2**27
@@ -54,20 +38,20 @@ class IncomingMessage:
     """
 
     replies: list[int] = field(default_factory=list)
-    request: Request | None = None
+    request: protocol.Request | None = None
     arrays: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
-    refusal: Message | None = None
+    refusal: protocol.Message | None = None
     size: int = 0
 
     @property
     def asks_for_session(self) -> bool:
         """True if the answer is the whole state."""
-        return isinstance(self.request, Hello | TakeOver)
+        return isinstance(self.request, protocol.Hello | protocol.TakeOver)
 
     @property
     def takes_over(self) -> bool:
         """True if the client takes the session from another page."""
-        return isinstance(self.request, TakeOver)
+        return isinstance(self.request, protocol.TakeOver)
 
 
 class Client:
@@ -85,8 +69,8 @@ class Client:
         self.page = page[:64]
         self._socket = socket
         self._incoming: list[IncomingMessage] = []
-        self._unsent: list[tuple[Message, int | None]] = []
-        self._withheld: list[tuple[Message, int | None]] | None = None
+        self._unsent: list[tuple[protocol.Message, int | None]] = []
+        self._withheld: list[tuple[protocol.Message, int | None]] | None = None
         self._has_incoming, self._has_room = asyncio.Event(), asyncio.Event()
         self._has_unsent, self._all_sent = asyncio.Event(), asyncio.Event()
         self._all_answered, self._may_read_on = asyncio.Event(), asyncio.Event()
@@ -151,7 +135,7 @@ class Client:
         if not self._incoming or not (last := self._incoming[-1]).request:
             return False
         old, new = last.request, incoming.request
-        if not (isinstance(old, Paint) and isinstance(new, Paint)):
+        if not (isinstance(old, protocol.Paint) and isinstance(new, protocol.Paint)):
             return False
         if old.is_final or (old.stroke, old.view) != (new.stroke, new.view):
             return False
@@ -161,7 +145,7 @@ class Client:
         self._incoming[-1] = incoming
         return True
 
-    def send(self, message: Message, reply: int | None = None) -> None:
+    def send(self, message: protocol.Message, reply: int | None = None) -> None:
         """Queue a message for the client. reply: number of the message that it answers."""
         if self._is_abandoned:
             return
@@ -240,12 +224,14 @@ def _parse_frame(frame: bytes | None) -> IncomingMessage:
         if is_other_version(content):
             text = "lightpaint has been updated: load this page again"
             return IncomingMessage(
-                _sequence_numbers(content), None, {}, Closing(reason="version", text=text)
+                _sequence_numbers(content), None, {}, protocol.Closing(reason="version", text=text)
             )
         seq, request, arrays = parse_request(content, buffers)
         return IncomingMessage([seq], request, arrays)
     except PaintError as error:
-        return IncomingMessage(_sequence_numbers(content), None, {}, Failure(text=str(error)))
+        return IncomingMessage(
+            _sequence_numbers(content), None, {}, protocol.Failure(text=str(error))
+        )
 
 
 def _sequence_numbers(content: Mapping[str, Any]) -> list[int]:
@@ -259,7 +245,9 @@ def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
 
 
 def _append(
-    queue: list[tuple[Message, int | None]], message: Message, reply: int | None = None
+    queue: list[tuple[protocol.Message, int | None]],
+    message: protocol.Message,
+    reply: int | None = None,
 ) -> None:
     """Append a message to a queue, or replace an event there that it outdates."""
     if reply is None and (key := _replacement_key(message)) is not None:
@@ -271,23 +259,28 @@ def _append(
     queue.append((message, reply))
 
 
-def _replacement_key(message: Message) -> tuple[Any, ...] | None:
+def _replacement_key(message: protocol.Message) -> tuple[Any, ...] | None:
     """Return a key for events of which only the newest counts; None for others."""
-    if isinstance(message, ProgressReport):
+    if isinstance(message, protocol.ProgressReport):
         return "progress", message.task
-    if isinstance(message, DraggedPlane):
+    if isinstance(message, protocol.DraggedPlane):
         return message.kind, message.light, message.view
-    if isinstance(message, MixedPicture):
+    if isinstance(message, protocol.MixedPicture):
         return message.kind, message.slot, message.view
-    is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
+    is_newest = isinstance(
+        message,
+        protocol.AnswerUpdate | protocol.PictureUpdate | protocol.LookList | protocol.SessionState,
+    )
     return (message.kind,) if is_newest else None
 
 
-def _merge(old: Message, new: Message) -> Message:
-    if isinstance(old, PictureUpdate) and isinstance(new, PictureUpdate):
-        return PictureUpdate(resources={**old.resources, **new.resources})
-    if isinstance(old, AnswerUpdate) and isinstance(new, AnswerUpdate):
+def _merge(old: protocol.Message, new: protocol.Message) -> protocol.Message:
+    if isinstance(old, protocol.PictureUpdate) and isinstance(new, protocol.PictureUpdate):
+        return protocol.PictureUpdate(resources={**old.resources, **new.resources})
+    if isinstance(old, protocol.AnswerUpdate) and isinstance(new, protocol.AnswerUpdate):
         # Live answers omit requests, which the replaced one may have contained.
-        names = [key for key in EditState.__dataclass_fields__ if getattr(new, key) is None]
+        names = [
+            key for key in protocol.EditState.__dataclass_fields__ if getattr(new, key) is None
+        ]
         return replace(new, **{name: getattr(old, name) for name in names})
     return new

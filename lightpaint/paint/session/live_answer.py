@@ -13,20 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint import lighting
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import Basis, Lights
 from lightpaint.colour import Lamp, ViewTransform, luminance
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.lighting import (
-    Constraints,
-    LiveSolver,
-    LiveView,
-    constraints_of,
-    reduce_lights,
-    resolve_fit,
-    with_scale,
-    with_sure_scale,
-)
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import PlanesReading
 from lightpaint.paint.session.session_planes import SessionPlanes, WishesInEffect
@@ -72,11 +63,11 @@ class LiveAnswer:
 
     def __init__(
         self,
-        views: Sequence[LiveView],
+        views: Sequence[lighting.LiveView],
         requests: SessionRequests,
         *,
         settings: Settings,
-        constraints: Constraints,
+        constraints: lighting.Constraints,
         transform: ViewTransform,
         lights_of: Callable[[SessionRequests], Lights],
     ) -> None:
@@ -90,13 +81,13 @@ class LiveAnswer:
         self._wishes: tuple[SessionRequests, tuple[str, ...], WishesInEffect | None] | None = None
         self.set_views(views)
 
-    def set_views(self, views: Sequence[LiveView]) -> None:
+    def set_views(self, views: Sequence[lighting.LiveView]) -> None:
         """Continue with these views; new lights start at their current emission."""
         former_basis, self._basis = self._basis, views[0].basis
         if former_basis.names != self._basis.names:
             self.weights = weights_by_name(self.weights, former_basis.names, self._basis.lights)
         constraints = self._constraints(self.requests)
-        self._live = LiveSolver(
+        self._live = lighting.LiveSolver(
             views,
             fit=self.fit,
             constraints=constraints,
@@ -135,7 +126,7 @@ class LiveAnswer:
         """
         return (requests or self.requests).settings(self._settings)
 
-    def constraints(self, requests: SessionRequests | None = None) -> Constraints:
+    def constraints(self, requests: SessionRequests | None = None) -> lighting.Constraints:
         """Return the constraints of requests, combined with the constraints of the scene."""
         requests = requests or self.requests
         constraints = self._base_constraints.and_then(requests.constraints())
@@ -178,7 +169,7 @@ class LiveAnswer:
     def check(self, requests: SessionRequests) -> None:
         """Raise LightpaintError for impossible requests, before anything is changed."""
         lights, fit = self._lights_of(requests), self._fit(requests)
-        reduce_lights(self._unrequired(requests), lights, fit)
+        lighting.reduce_lights(self._unrequired(requests), lights, fit)
         if lights.names == self._basis.names:
             self._find_wishes(requests)
 
@@ -224,19 +215,19 @@ class LiveAnswer:
 
     def _fit(self, requests: SessionRequests) -> Settings:
         settings = requests.settings(self._settings)
-        return resolve_fit(
+        return lighting.resolve_fit(
             settings, over_look=True, through_view=True, display=lambda: self._transform
         )
 
-    def _constraints(self, requests: SessionRequests) -> Constraints:
+    def _constraints(self, requests: SessionRequests) -> lighting.Constraints:
         """Return all constraints, with what the wishes for planes require."""
         wishes = self._wishes_under(requests)
         required = None if wishes is None else wishes.requirements
         return replace(self._unrequired(requests), requirements=required)
 
-    def _unrequired(self, requests: SessionRequests) -> Constraints:
-        constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
-        scaled = with_sure_scale if self._settings.planes is None else with_scale
+    def _unrequired(self, requests: SessionRequests) -> lighting.Constraints:
+        constraints = lighting.constraints_of(self._basis.requests).and_then(self._base_constraints)
+        scaled = lighting.with_sure_scale if self._settings.planes is None else lighting.with_scale
         return scaled(constraints.and_then(requests.constraints()), self._basis.lights)
 
     def _wishes_under(self, requests: SessionRequests) -> WishesInEffect | None:
@@ -259,7 +250,7 @@ class LiveAnswer:
             constraints = self._unrequired(requests)
             wishes = WishesInEffect.of(
                 self._planes.for_lights(lights),
-                reduce_lights(constraints, lights, self._fit(requests)),
+                lighting.reduce_lights(constraints, lights, self._fit(requests)),
                 are_ignored=requests.ignores_wishes,
             )
             self._wishes = requests, lights.names, wishes

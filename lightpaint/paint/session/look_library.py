@@ -13,20 +13,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_stack import LayerStack
-from lightpaint.paint.protocol import (
-    CopyLook,
-    DropLook,
-    LoadLook,
-    LookInfo,
-    LookList,
-    Message,
-    MixLooks,
-    Propose,
-    RenameLook,
-    SaveLook,
-)
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
@@ -42,7 +31,14 @@ MAX_PROPOSALS = 16
 #: Name of the array of "at least" marks.
 MARKS_ARRAY = "at_least"
 
-LookRequest = SaveLook | RenameLook | CopyLook | MixLooks | DropLook | Propose
+LookRequest = (
+    protocol.SaveLook
+    | protocol.RenameLook
+    | protocol.CopyLook
+    | protocol.MixLooks
+    | protocol.DropLook
+    | protocol.Propose
+)
 
 
 @dataclass(frozen=True)
@@ -69,10 +65,10 @@ class LookLibrary:
             self._offer_thumbnails(look)
             self._renew_drives(look)
 
-    def infos(self) -> tuple[LookInfo, ...]:
+    def infos(self) -> tuple[protocol.LookInfo, ...]:
         """Return the descriptions of looks for clients."""
         return tuple(
-            LookInfo(
+            protocol.LookInfo(
                 id=look.id,
                 name=look.fields["name"],
                 stamp=look.fields.get("stamp"),
@@ -85,30 +81,30 @@ class LookLibrary:
             for look in self._session.store.looks()
         )
 
-    def handle(self, message: LookRequest) -> Message:
+    def handle(self, message: LookRequest) -> protocol.Message:
         """Handle a request about looks. Raises PaintError for a look that does not exist."""
         store = self._session.store
         match message:
-            case SaveLook(name):
+            case protocol.SaveLook(name):
                 self._store(self._current_look(self._clean_name(name)))
-            case RenameLook(number, name):
+            case protocol.RenameLook(number, name):
                 look = self._find(number)
                 fields = {**look.fields, "name": self._clean_name(name), "is_proposal": False}
                 self._store(StoredLook(look.id, fields, look.arrays))
-            case CopyLook(number):
+            case protocol.CopyLook(number):
                 look = self._find(number)
                 fields = {**look.fields, "name": f"{look.fields['name']} copy"[:MAX_NAME_LENGTH]}
                 fields["is_proposal"] = False
                 self._store(StoredLook(self._next_id(), fields, look.arrays))
-            case MixLooks():
+            case protocol.MixLooks():
                 self._store(self._mixed_look(message))
-            case Propose():
+            case protocol.Propose():
                 self._store(self._proposed_look(message))
-            case DropLook(number):
+            case protocol.DropLook(number):
                 store.drop_look(self._find(number).id)
                 for k in range(len(self._session.views)):
                     self._pictures.withdraw(name_in_view(f"look/{number}", k))
-        return LookList(looks=self.infos(), resources=self._pictures.stable_generations())
+        return protocol.LookList(looks=self.infos(), resources=self._pictures.stable_generations())
 
     def lighting(self, number: int) -> LookLighting:
         """Return the lighting of a look. Raises PaintError for a look that does not exist."""
@@ -116,7 +112,7 @@ class LookLibrary:
         emissions = dict(zip(self._names(look), self._output(look), strict=True))
         return LookLighting(_requests(look).placed, emissions)
 
-    def load(self, message: LoadLook) -> list[Message]:
+    def load(self, message: protocol.LoadLook) -> list[protocol.Message]:
         """Replace painting, requests and places by a look's, as a step of undo."""
         look = self._find(message.look)
         paintings = dict(enumerate(self._paintings(look)))
@@ -179,7 +175,7 @@ class LookLibrary:
         layers, pixels = LayeredPaintings.of(self._session.views).as_fields()
         return StoredLook(look.id, {**look.fields, "layers": layers}, {**look.arrays, **pixels})
 
-    def _mixed_look(self, message: MixLooks) -> StoredLook:
+    def _mixed_look(self, message: protocol.MixLooks) -> StoredLook:
         """Return a mix of two looks: both paintings, weighted, and the lights locked between the
         answers.
         """
@@ -213,7 +209,7 @@ class LookLibrary:
         }
         return replace(SessionRequests(locks), poses=requests.poses, added=requests.added)
 
-    def _proposed_look(self, message: Propose) -> StoredLook:
+    def _proposed_look(self, message: protocol.Propose) -> StoredLook:
         """Return a look of the current painting with a proposed lighting."""
         name, session = self._clean_name(message.name), self._session
         lights = session.basis.lights

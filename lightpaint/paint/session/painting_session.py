@@ -29,6 +29,7 @@ from lightpaint.paint.layers.spent_adjustments import SpentAdjustments, without_
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.references.likeness import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
+from lightpaint.paint.session import session_messages
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import (
     LiveAnswer,
@@ -41,13 +42,6 @@ from lightpaint.paint.session.live_answer import (
     weights_by_name,
 )
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
-from lightpaint.paint.session.session_messages import (
-    Judgement,
-    answer_findings,
-    canvas_patches,
-    edit_state,
-    unpainted_headline,
-)
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.database import DamagedError
@@ -235,7 +229,7 @@ class Session:
         self,
         snapshot: SessionSnapshot,
         solution: Solution | None,
-        judgement: Judgement | None = None,
+        judgement: session_messages.Judgement | None = None,
     ) -> AnswerUpdate | None:
         """Accept the exact answer to `snapshot`, and return it; None if the session has changed
         since.
@@ -257,15 +251,17 @@ class Session:
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
         answer, bases = self.live_answer, [view.basis for view in self.views]
-        findings = answer_findings(bases, self.weights, answer.lamps, answer.mixed_emissions)
+        findings = session_messages.answer_findings(
+            bases, self.weights, answer.lamps, answer.mixed_emissions
+        )
         if self.is_painted:
             return findings
-        return replace(findings, headline=unpainted_headline(self.live_answer))
+        return replace(findings, headline=session_messages.unpainted_headline(self.live_answer))
 
     @property
     def edit_state(self) -> dict[str, Any]:
         """Steps that can be undone, and requests in effect: the fields of `EditState`."""
-        return edit_state(self.history, self.live_answer, self.views)
+        return session_messages.edit_state(self.history, self.live_answer, self.views)
 
     def _answer_to_edit(self, *, is_final: bool) -> Message:
         """Return the answer to paint or a change of layers, with the steps once it is one."""
@@ -284,7 +280,7 @@ class Session:
             "mode": self.live_answer.mode,
             "weights": self.weights,
         }
-        return canvas_patches(self.views, regions, **fields, **self.edit_state)
+        return session_messages.canvas_patches(self.views, regions, **fields, **self.edit_state)
 
     # Paint
 

@@ -34,23 +34,9 @@ from lightpaint.lighting import (
     main_deliveries,
     merge_views,
 )
+from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.protocol import (
-    Advice,
-    CanvasPatch,
-    Closeness,
-    EmitterInfo,
-    Findings,
-    LayerInfo,
-    LayerList,
-    LightAnswer,
-    LightInfo,
-    Message,
-    ResolvedFit,
-    SelectionInfo,
-    WishDelivery,
-)
 from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.history_steps import Region
@@ -88,12 +74,12 @@ CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the li
 
 def light_info(
     light: BasisLight, scale: float, lamp: Lamp | None = None, address: str = ""
-) -> LightInfo:
+) -> protocol.LightInfo:
     """Return the constant properties of a light. scale: as in `LightInfo`. lamp: what mixes it, if
     known. address: as in `LightInfo`.
     """
     members = tuple(light.members)
-    return LightInfo(
+    return protocol.LightInfo(
         name=light.name,
         label=light.name,
         unit=light.unit,
@@ -117,9 +103,9 @@ def _own_emitters(light: BasisLight, lamp: Lamp) -> tuple[LampEmitter, ...]:
     return tuple(map(in_own_color, lamp.emitters)) if light.lamp else lamp.emitters
 
 
-def _emitter_info(emitter: LampEmitter) -> EmitterInfo:
+def _emitter_info(emitter: LampEmitter) -> protocol.EmitterInfo:
     color = np.maximum(np.array(emitter.emission), 0)
-    return EmitterInfo(emitter.name, rgb_to_hex(color))
+    return protocol.EmitterInfo(emitter.name, rgb_to_hex(color))
 
 
 def answer_findings(
@@ -127,7 +113,7 @@ def answer_findings(
     weights: Doubles,
     lamps: Mapping[int, Lamp] | None = None,
     mixed_emissions: Mapping[int, RGB] | None = None,
-) -> Findings:
+) -> protocol.Findings:
     """Return the immediate findings on each light: emission, change, colour, share of the picture.
 
     With several views, `shares` has its part of each. lamps: what mixes a light from emitters, by
@@ -142,7 +128,7 @@ def answer_findings(
         )
     )
     shares = tuple(_shares(x) for x in lit) if len(bases) > 1 else None
-    return Findings(lights=lights, shares=shares)
+    return protocol.Findings(lights=lights, shares=shares)
 
 
 def _shares(lit: Doubles) -> tuple[float, ...]:
@@ -152,7 +138,7 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
 
 def _light_answer(
     light: BasisLight, weight: Doubles, share: float, lamp: Lamp | None, mixed: RGB | None
-) -> LightAnswer:
+) -> protocol.LightAnswer:
     own = weight
     if light.lamp and lamp is not None:
         own = weight[0] * color_of_emitter(lamp.emitters[0])
@@ -160,7 +146,7 @@ def _light_answer(
     current, answered = (
         float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
     )
-    return LightAnswer(
+    return protocol.LightAnswer(
         emission=as_rgb(weight),
         stops=float(np.log2(answered / current))
         if current > 0 and answered > OFF * current
@@ -190,12 +176,12 @@ class Judgement:
     deliveries: of all views together.
     """
 
-    worst: Closeness
-    closeness: tuple[Closeness | None, ...]
+    worst: protocol.Closeness
+    closeness: tuple[protocol.Closeness | None, ...]
     lights: tuple[tuple[str | None, bool, bool, str | None], ...]
-    deliveries: tuple[WishDelivery, ...] = ()
+    deliveries: tuple[protocol.WishDelivery, ...] = ()
 
-    def complete(self, findings: Findings) -> Findings:
+    def complete(self, findings: protocol.Findings) -> protocol.Findings:
         """Return immediate findings with the results of the analysis."""
         lights = tuple(
             replace(
@@ -273,16 +259,18 @@ def _worst_view(painted: Sequence[int], analyses: Sequence[Analysis]) -> int:
     return painted[max(range(len(analyses)), key=lack)]
 
 
-def _wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
+def _wish_deliveries(analyses: Sequence[Analysis]) -> tuple[protocol.WishDelivery, ...]:
     """Return how much of each wish came in all views together, for the list of layers."""
     entries = [entry for analysis in analyses for entry in analysis.appearance.deliveries]
     return tuple(wish_delivery(x) for x in merge_views(entries))
 
 
-def wish_delivery(delivery: Delivery) -> WishDelivery:
+def wish_delivery(delivery: Delivery) -> protocol.WishDelivery:
     """Return one entry of that list."""
     x = delivery
-    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e, x.is_darker)
+    return protocol.WishDelivery(
+        x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e, x.is_darker
+    )
 
 
 def unpainted_text(
@@ -414,26 +402,28 @@ def removable_reason(appearance: Appearance) -> Reason | None:
     return None if first.kind == "views" else first
 
 
-def advice(appearance: Appearance) -> Advice | None:
+def advice(appearance: Appearance) -> protocol.Advice | None:
     """Return the same as data for a page's button: the obstacle to remove, and the gain."""
     if (cause := removable_reason(appearance)) is None:
         is_missed = not appearance.is_close and appearance.place is not None
         if not is_missed or appearance.causes:
             return None
         is_for_new = appearance.lacks_light_of_its_own and appearance.has_strong_light
-        return Advice("light" if is_for_new else "reach", (), None, None)
+        return protocol.Advice("light" if is_for_new else "reach", (), None, None)
     if cause.kind == "hold" and not _helps_to_loosen(appearance, cause):
-        return Advice("light", (), None, None)
+        return protocol.Advice("light", (), None, None)
     kind, names = cause.kind, tuple(cause.names)
     # The gain of a part of the paint is not the gain of the preview, which is about all of it.
     is_of_all = not appearance.reasons_wish
     if kind != "hold":
         gain = cause.share if is_of_all and not cause.is_joint else None
-        return Advice(kind, names, gain, None, cause.delta_e)
+        return protocol.Advice(kind, names, gain, None, cause.delta_e)
     weaker = cause.loosening
     if weaker is None:
-        return Advice(kind, names, None, 0.0)
-    return Advice(kind, names, weaker.share if is_of_all else None, weaker.hold, weaker.delta_e)
+        return protocol.Advice(kind, names, None, 0.0)
+    return protocol.Advice(
+        kind, names, weaker.share if is_of_all else None, weaker.hold, weaker.delta_e
+    )
 
 
 def _helps_to_loosen(appearance: Appearance, hold: Reason) -> bool:
@@ -449,14 +439,14 @@ def _helps_to_loosen(appearance: Appearance, hold: Reason) -> bool:
     return weaker.present_hold == DEFAULT_HOLD and not weaker.is_at_cost
 
 
-def _closeness(analysis: Analysis) -> Closeness:
+def _closeness(analysis: Analysis) -> protocol.Closeness:
     """Return how close one view is, and why not closer."""
     appearance = analysis.appearance
     if appearance.is_close:
         sentences = report.compensation_sentences(appearance.compensating_lights)
     else:
         sentences = report.bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)
-    return Closeness(
+    return protocol.Closeness(
         headline=sketch_headline(appearance),
         help=advice(appearance),
         delta_e=appearance.delta_e,
@@ -498,25 +488,25 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         "poses": dict(requests.poses),
         "added_lights": tuple(requests.added),
         "places": requests.place_key,
-        "effective_settings": ResolvedFit(fit.space, fit.hold, fit.colors),
-        "layers": LayerList(
+        "effective_settings": protocol.ResolvedFit(fit.space, fit.hold, fit.colors),
+        "layers": protocol.LayerList(
             tuple(_layer_info(layer, views) for layer in views.layers), views.next_layer
         ),
         "master": requests.master,
         "earlier": dict(requests.earlier),
         "kept": requests.kept,
         "is_started": bool(requests.start),
-        "selection": SelectionInfo(
+        "selection": protocol.SelectionInfo(
             tuple(view.selection.bounds for view in views),
             sum(view.selection.revision for view in views),
         ),
     }
 
 
-def _layer_info(layer: Layer, views: Canvases) -> LayerInfo:
+def _layer_info(layer: Layer, views: Canvases) -> protocol.LayerInfo:
     """Return a layer for clients, with the region of its pixels in each view."""
     pixels = [view.layer(layer.id) for view in views]
-    return LayerInfo(
+    return protocol.LayerInfo(
         **vars(layer),
         regions=tuple(one.bounds for one in pixels),
         accents=tuple(view.accent(layer.id) for view in views),
@@ -544,17 +534,17 @@ def unpainted_headline(live_answer: LiveAnswer) -> str:
 
 def canvas_patches(
     canvases: Canvases, regions: Sequence[tuple[int, Region]], **fields: Any
-) -> list[Message]:
+) -> list[protocol.Message]:
     """Return the canvases' pixels there: a message for each view, or one for the first if nowhere.
 
     fields: the further fields of each.
     """
     views = tuple(view for view, _ in regions)
-    messages: list[Message] = []
+    messages: list[protocol.Message] = []
     for view, region in regions or ((0, (0, 0, 0, 0)),):
         image, importance, _ = canvases[view].pixels(region)
         messages.append(
-            CanvasPatch(
+            protocol.CanvasPatch(
                 region=region,
                 view=view,
                 views=views,

@@ -9,14 +9,7 @@ import numpy as np
 from lightpaint import lighting
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis import Lights
-from lightpaint.paint.protocol import (
-    Camera,
-    MeasuredPlane,
-    PlaneLight,
-    PlanesInfo,
-    PlanesReading,
-    PlaneWish,
-)
+from lightpaint.paint import protocol
 from lightpaint.photometry import Illuminance, LightCase, MeasuringPlane, PowerBudget, plane_title
 
 
@@ -28,7 +21,7 @@ class PlaneSight:
     point there.
     """
 
-    camera: Camera | None
+    camera: protocol.Camera | None
     is_seen: Bools
 
 
@@ -81,9 +74,9 @@ class SessionPlanes:
         )
 
     @cached_property
-    def info(self) -> PlanesInfo:
+    def info(self) -> protocol.PlanesInfo:
         """The planes and their wishes for clients."""
-        return PlanesInfo(
+        return protocol.PlanesInfo(
             tuple(
                 self._plane_info(plane, case)
                 for case in [case.name for case in self.cases] or [""]
@@ -94,11 +87,11 @@ class SessionPlanes:
             cameras=tuple(sight.camera for sight in self.sights),
         )
 
-    def _plane_info(self, plane: MeasuringPlane, case: str) -> MeasuredPlane:
+    def _plane_info(self, plane: MeasuringPlane, case: str) -> protocol.MeasuredPlane:
         """Return a plane in a case for clients."""
         points = self.illuminance.points_of(plane.name)
         sides = None if plane.sides is None else plane.sides.reshape(-1, 6)
-        return MeasuredPlane(
+        return protocol.MeasuredPlane(
             name=plane_title(plane.name, case),
             plane=plane.name,
             case=case,
@@ -144,7 +137,7 @@ class WishesInEffect:
             requirements, _ = lighting.requirements_within_reach(wished, reduction)
         return cls(planes, reduction, wished, requirements)
 
-    def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
+    def reading(self, weights: Doubles, place_key: str) -> protocol.PlanesReading:
         """Return the lux on all planes and the power under weights (n, 3), and missed wishes.
 
         place_key: identifies the present places of the lights.
@@ -154,9 +147,9 @@ class WishesInEffect:
         )
         measured = self.planes.illuminance
         lux = {case: measured.of(lit) for case, lit in answer.weights_by_case.items()}
-        return PlanesReading(
+        return protocol.PlanesReading(
             tuple(
-                PlaneLight(
+                protocol.PlaneLight(
                     mean=reading.mean,
                     mean_error=reading.mean_error,
                     uniformity=reading.uniformity,
@@ -176,10 +169,10 @@ class WishesInEffect:
 
 def _wishes_of(
     plane: str, case: str, outcomes: Sequence[lighting.WishOutcome]
-) -> tuple[PlaneWish, ...]:
+) -> tuple[protocol.PlaneWish, ...]:
     """Return the wishes for a plane in a case, and whether they are met; "" for the power."""
     return tuple(
-        PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
+        protocol.PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
         for x in outcomes
         if (x.wish.plane, x.wish.case) == (plane, case)
     )

@@ -11,20 +11,12 @@ from lightpaint.basis import Basis, DenoisedPlanes, LightImage, RoughPlanes, as_
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import resampled
+from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lighting_presets import PRESETS, find_preset, requested_look
-from lightpaint.paint.protocol import (
-    ImageInfo,
-    PresetInfo,
-    ReferenceInfo,
-    SampleCount,
-    TableInfo,
-    TransformInfo,
-    ViewInfo,
-)
 from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
@@ -215,14 +207,14 @@ def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
     return as_halves(planes.plane(k), plane_scale(planes.basis, k))
 
 
-def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
+def _view_info(view: Canvas, basis: Basis) -> protocol.ViewInfo:
     """Return the description of a view for clients.
 
     basis: of the view, with lights at their places in the scene, so that moves change no scale.
     Planes of added lights are sent unscaled.
     """
     objects, (height, width) = basis.objects, view.size
-    return ViewInfo(
+    return protocol.ViewInfo(
         name=view.name,
         size=(height, width),
         objects=() if objects is None else tuple(objects.names),
@@ -258,15 +250,18 @@ def state_fields(
         "images": tuple(map(_image_info, light_images(basis.lights))),
         "views": views,
         "transforms": tuple(transform.name for transform in offered_transforms(session)),
-        "transform": TransformInfo(session.transform.name, session.transform.stops),
-        "lut": TableInfo(picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH),
+        "transform": protocol.TransformInfo(session.transform.name, session.transform.stops),
+        "lut": protocol.TableInfo(
+            picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH
+        ),
         "resources": pictures.stable_generations(),
         "looks": looks.infos(),
         "presets": tuple(
-            PresetInfo(x.name, x.title, x.description, x.has_subject) for x in PRESETS.values()
+            protocol.PresetInfo(x.name, x.title, x.description, x.has_subject)
+            for x in PRESETS.values()
         ),
-        "references": tuple(ReferenceInfo(x.id, x.name) for x in session.references),
-        "basis": SampleCount(
+        "references": tuple(protocol.ReferenceInfo(x.id, x.name) for x in session.references),
+        "basis": protocol.SampleCount(
             spp=basis.origin.spp,
             target_spp=target_spp or basis.origin.spp,
             is_complete=target_spp is None or basis.origin.spp >= target_spp,
@@ -278,10 +273,10 @@ def state_fields(
     }
 
 
-def _image_info(image: LightImage) -> ImageInfo:
+def _image_info(image: LightImage) -> protocol.ImageInfo:
     """Return the description of an image for clients."""
     width, height = image.domain.picture_size(image.size, ASPECT_PIXELS)
-    return ImageInfo(
+    return protocol.ImageInfo(
         name=image.name,
         places=tuple(map(tuple, image.nearest.tolist())),
         shares=tuple(

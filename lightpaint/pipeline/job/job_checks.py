@@ -6,13 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import Basis, LightGroups, with_equal_lights
-from lightpaint.basis.render import (
-    memory_expected,
-    memory_needed,
-    remark_on_separate_renders,
-    renders_in_bands,
-)
+from lightpaint.basis import Basis, LightGroups, render, with_equal_lights
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
@@ -256,7 +250,7 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     # Python code gets the same text as a warning.
     note = use_variant().note
     if not note and is_rendered:
-        note = remark_on_separate_renders(scene) or ""
+        note = render.remark_on_separate_renders(scene) or ""
     return [*remarks, note] if note else remarks
 
 
@@ -328,10 +322,10 @@ def remarks_of_memory(scene: Scene, spp: int | None) -> list[str]:
 
     spp: samples per pixel; None for the scene's own.
     """
-    most = memory_needed(scene, in_bands=renders_in_bands(scene))
+    most = render.memory_needed(scene, in_bands=render.renders_in_bands(scene))
     if most <= MUCH_MEMORY:
         return []
-    expected = memory_expected(scene, scene.spp if spp is None else spp)
+    expected = render.memory_expected(scene, scene.spp if spp is None else spp)
     text = f"at most {most / 1e9:.1f} GB of memory"
     if expected < most:
         text = f"about {expected / 1e9:.1f} GB of memory, {text.removesuffix(' of memory')}"

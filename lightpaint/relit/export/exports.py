@@ -23,16 +23,8 @@ from lightpaint.files import write_text
 from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Lighting, LightSetting, key_slopes
+from lightpaint.relit.export import program_axes
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
-from lightpaint.relit.export.program_axes import (
-    SAME_PLACE,
-    axis_conversions,
-    blender_axes,
-    conversion_of,
-    has_new_cone,
-    is_changed,
-    old_position,
-)
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's quantity for each parameter of Mitsuba's emitters.
@@ -89,7 +81,7 @@ def scene_script(
         walls=_table(walls),
         slides=_table(slides),
         drives=_table(drives),
-        sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
+        sky_axes=repr(np.round(program_axes.blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )
 
@@ -109,12 +101,14 @@ def filled_script(name: str, **values: str) -> str:
 
 def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
     """Return the places in the form of the script, in the scene's axes."""
-    rotations = axis_conversions(up, UP)
-    own_conversion = conversion_of(places, [np.eye(3)], {})
-    current = {place.name: old for place in places if (old := old_position(place)) is not None}
+    rotations = program_axes.axis_conversions(up, UP)
+    own_conversion = program_axes.conversion_of(places, [np.eye(3)], {})
+    current = {
+        place.name: old for place in places if (old := program_axes.old_position(place)) is not None
+    }
     moved_places, new_places = {}, {}
-    for place in filter(is_changed, places):
-        cone = _cone(place) if has_new_cone(place) else None
+    for place in filter(program_axes.is_changed, places):
+        cone = _cone(place) if program_axes.has_new_cone(place) else None
         if place.new:
             axes = own_conversion.frame(place).tolist()
             new_places[place.name] = (LAMPS[place.new], place.position, axes, cone, place.size)
@@ -123,7 +117,7 @@ def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
     return {
         "rotations": repr([np.round(rotation, 12).tolist() for rotation in rotations]),
         "present": _table(current),
-        "same_place": repr(SAME_PLACE * own_conversion.size),
+        "same_place": repr(program_axes.SAME_PLACE * own_conversion.size),
         "moved": _table(moved_places),
         "added": _table(new_places),
     }

@@ -9,15 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.relit.export.usd import (
-    Overrides,
-    check_usd,
-    color_space_of,
-    from_rec709,
-    like_stage,
-    open_stage,
-    to_rec709,
-)
+from lightpaint.relit.export import usd
 
 #: End of the attributes in which renderers keep the tag of a light, such as
 #: `inputs:karma:light:lpetag`.
@@ -31,7 +23,7 @@ def usd_multipliers(
     *,
     about: str = "",
     by_frame: Mapping[int, Mapping[str, RGB]] | None = None,
-) -> Overrides:
+) -> usd.Overrides:
     """Return a layer that multiplies lights of a stage.
 
     A group belongs to the lights with its name as path (also with underscores for slashes) or as
@@ -51,10 +43,10 @@ def usd_multipliers(
 
     Raises OutputError if the library is not installed, or cannot read the stage.
     """
-    check_usd()
+    usd.check_usd()
     from pxr import Sdf, Usd
 
-    opened_stage = open_stage(stage)
+    opened_stage = usd.open_stage(stage)
     lights = [prim for prim in opened_stage.Traverse() if _is_light(prim)]
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.comment = about
@@ -72,8 +64,8 @@ def usd_multipliers(
             for frame, at_frame in (by_frame or {}).items():
                 _multiply(override, prim, at_frame[group], Usd.TimeCode(frame))
     layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
-    like_stage(layer, stage)
-    return Overrides(layer.ExportToString(), tuple(left))
+    usd.like_stage(layer, stage)
+    return usd.Overrides(layer.ExportToString(), tuple(left))
 
 
 def lights_of_group(lights: Sequence[Any], group: str) -> list[Any]:
@@ -125,7 +117,7 @@ def _multiply(override: Any, prim: Any, multiplier: RGB, time: Any) -> None:
     light.CreateIntensityAttr().Set(intensity, time)
     if greatest <= 0:
         return
-    space = color_space_of(prim)
-    color = to_rec709(present.GetColorAttr().Get(), space)
+    space = usd.color_space_of(prim)
+    color = usd.to_rec709(present.GetColorAttr().Get(), space)
     scaled = [c * m / greatest for c, m in zip(color, multiplier, strict=True)]
-    light.CreateColorAttr().Set(Gf.Vec3f(*from_rec709(scaled, space)), time)
+    light.CreateColorAttr().Set(Gf.Vec3f(*usd.from_rec709(scaled, space)), time)

@@ -23,14 +23,8 @@ from lightpaint.lighting import (
     Uncertainty,
     renderings_of,
 )
-from lightpaint.report import phrases
+from lightpaint.report import diagnosis_sentences, phrases
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, cached_clean_planes, page_reduction
-from lightpaint.report.diagnosis_sentences import (
-    UNDETERMINED,
-    UNTOLD_HERE,
-    spoken_errors,
-    unreached_channels,
-)
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
@@ -231,13 +225,17 @@ def _rows(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None, *, is_clean: bool
 ) -> list[LightEntry]:
     shares, lighting = energy_shares(basis, solution.lighting), solution.lighting
-    errors = spoken_errors(uncertainty, len(shares))
+    errors = diagnosis_sentences.spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in lighting.lights}
     rows: list[LightEntry] = []
     thumbnails = _thumbnails_of_rows(basis, lighting, is_clean=is_clean)
     for k, light in enumerate(basis.lights):
         setting = settings[light.name]
-        error = UNTOLD_HERE if errors[k] == UNDETERMINED else errors[k]
+        error = (
+            diagnosis_sentences.UNTOLD_HERE
+            if errors[k] == diagnosis_sentences.UNDETERMINED
+            else errors[k]
+        )
         changed = change(light, setting)
         notes = filter(None, (*changed.notes, error, _constraint_note(setting)))
         row = LightEntry(
@@ -326,7 +324,7 @@ def change(light: BasisLight, setting: LightSetting) -> LevelChange:
     changed = luminance_change(now, new)
     if not setting.is_partly_reached:
         return changed
-    note = f"{unreached_channels(setting)} unchanged: reaches nothing painted"
+    note = f"{diagnosis_sentences.unreached_channels(setting)} unchanged: reaches nothing painted"
     return LevelChange(changed.text, (*changed.notes, note))
 
 

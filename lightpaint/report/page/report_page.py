@@ -25,26 +25,15 @@ from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, covered, in_turns
 from lightpaint.photometry import false_colours, plane_title
 from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
-from lightpaint.report import answer_pictures, measures, planes_text
+from lightpaint.report import answer_pictures, diagnosis_sentences, measures, planes_text
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
-from lightpaint.report.diagnosis_sentences import (
-    fit_sentence,
-    is_unnamed,
-    partly_reached,
-    wish_name,
-)
+from lightpaint.report.page import limit_sections
 from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
 from lightpaint.report.page.html import facts, html, name_list
 from lightpaint.report.page.lights_table import (
     lights_table,
     rendering_section,
     thumbnails_of,
-)
-from lightpaint.report.page.limit_sections import (
-    colors_section,
-    constraints_section,
-    missed_section,
-    sure_section,
 )
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
@@ -90,7 +79,7 @@ def report_page(
         ),
         "wipe": partial(_wipe, answer, looks, raw, transform=transform),
         "missed": partial(
-            missed_section,
+            limit_sections.missed_section,
             solution,
             answer.diagnosis,
             looks.current,
@@ -101,7 +90,7 @@ def report_page(
             and basis.origin.scene.endswith(".xml"),
         ),
         "constraints": partial(
-            constraints_section,
+            limit_sections.constraints_section,
             basis,
             solution,
             answer.unconstrained,
@@ -120,7 +109,7 @@ def report_page(
         **parts,
         **_texts(answer),
         mixer_assets=mixer_assets(),
-        colors=colors_section(answer.color_choices),
+        colors=limit_sections.colors_section(answer.color_choices),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         wishes=wishes_section(answer.appearance),
         planes=planes_section(answer.planes),
@@ -134,7 +123,7 @@ def report_page(
             is_clean=looks.is_clean,
         ),
         rendering=rendering_section(solution.lighting, answer.surfaces),
-        sure=sure_section(basis, solution, answer.uncertainty),
+        sure=limit_sections.sure_section(basis, solution, answer.uncertainty),
         command=answer.command,
     )
     return str(page)
@@ -157,7 +146,7 @@ def _texts(answer: measures.ReportedAnswer) -> dict[str, Any]:
         "target": target.name,
         "scene": f"{origin.scene}, sensor {origin.sensor}",
         "verdict": verdict(solution, predicted, verification, appearance=answer.appearance),
-        "meant": fit_sentence(solution),
+        "meant": diagnosis_sentences.fit_sentence(solution),
         "verification": verification,
         "remarks": emitter_remarks(target, solution, predicted),
         "fit": fit_table(solution),
@@ -292,9 +281,14 @@ def wishes_section(appearance: lighting.Appearance | None) -> Markup:
     """
     deliveries = () if appearance is None else appearance.deliveries
     entries = [entry for entry in deliveries if entry.least is not None]
-    if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
+    if not entries or (len(entries) == 1 and diagnosis_sentences.is_unnamed(entries[0])):
         return Markup("")
-    return html("wishes", entries=entries, wish_name=wish_name, spoken_share=lighting.spoken_share)
+    return html(
+        "wishes",
+        entries=entries,
+        wish_name=diagnosis_sentences.wish_name,
+        spoken_share=lighting.spoken_share,
+    )
 
 
 def fit_table(solution: lighting.Solution) -> Markup:
@@ -407,7 +401,7 @@ def render_table(
             entries.append(("Kept as they are", name_list(light.members)))
     if q.unreached:
         entries.append(("Reach nothing painted, so unchanged", name_list(q.unreached)))
-    for channels in partly_reached(solution.lighting):
+    for channels in diagnosis_sentences.partly_reached(solution.lighting):
         entries.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
         entries.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))

@@ -20,17 +20,9 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Bools
+from lightpaint.basis.render.tracer import wavelengths
 from lightpaint.basis.render.tracer.emitter_guide import BELOW_1
 from lightpaint.basis.render.tracer.sobol import APERTURE, FILM, TIME
-from lightpaint.basis.render.tracer.wavelengths import (
-    RgbPaths,
-    each_bsdf_sample,
-    each_bsdf_value,
-    each_direction,
-    each_emission,
-    is_any,
-    products,
-)
 
 #: Multiples of this, modulo 1, are evenly spread for any number of them.
 GOLDEN_RATIO = 0.6180339887
@@ -78,7 +70,7 @@ class View(NamedTuple):
     width: int
     height: int
     points: Any = None
-    paths: Any = RgbPaths()
+    paths: Any = wavelengths.RgbPaths()
 
 
 def _camera_rays(view, sampler, numbers, pixel, term):
@@ -158,9 +150,11 @@ def _leave_points(view, waves, numbers, guide, planes, rules, pixel, place, term
         is_lit,
     )
     lobe, direction, _ = _numbers_of_surface(None, numbers, term, depth)
-    sample, bsdf_weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, True)
+    sample, bsdf_weight = wavelengths.each_bsdf_sample(waves, bsdf, si, lobe, direction, True)
     ray = si.spawn_ray(si.to_world(sample.wo))
-    return _Start(ray, products(weight, bsdf_weight), mi.Interaction3f(si), cell, sample.pdf)
+    return _Start(
+        ray, wavelengths.products(weight, bsdf_weight), mi.Interaction3f(si), cell, sample.pdf
+    )
 
 
 @dr.syntax
@@ -230,9 +224,9 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             pdf = emitter.pdf_direction(previous, ds, by_choice)
             pdf *= guide.probability(previous_cell, emitter, by_choice)
             pdf *= rules.emitter_samples_at(depth - 1)
-        emission = each_emission(waves, emitter, si, hit & (previous_pdf > 0))
-        carried = products(weight, throughput)
-        emitted = waves.light(products(carried, emission, _mis(previous_pdf, pdf)))
+        emission = wavelengths.each_emission(waves, emitter, si, hit & (previous_pdf > 0))
+        carried = wavelengths.products(weight, throughput)
+        emitted = waves.light(wavelengths.products(carried, emission, _mis(previous_pdf, pdf)))
         planes.add(place, emitter, emitted, ray.d, si.uv, depth, hit)
         planes.note_seen(place, hit & looks_through)
 
@@ -270,9 +264,11 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
 
         # Sample the BSDF for the next direction.
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
-        sample, bsdf_weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, active_next)
+        sample, bsdf_weight = wavelengths.each_bsdf_sample(
+            waves, bsdf, si, lobe, direction, active_next
+        )
         ray = si.spawn_ray(si.to_world(sample.wo))
-        throughput = products(throughput, bsdf_weight)
+        throughput = wavelengths.products(throughput, bsdf_weight)
         eta *= sample.eta
         previous = mi.Interaction3f(si)
         previous_pdf = sample.pdf
@@ -316,12 +312,12 @@ def _will_bounce(scene, waves, sampler, numbers, term, ray, pi, active, rules):
         if dr.hint(sampler is not None, mode="scalar"):
             sampler.next_2d()  # the number that chooses an emitter
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
-        sample, weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, active)
+        sample, weight = wavelengths.each_bsdf_sample(waves, bsdf, si, lobe, direction, active)
         passes = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
         bounces |= active & si.is_valid() & ~passes
 
         ray = si.spawn_ray(si.to_world(sample.wo))
-        throughput = products(throughput, weight)
+        throughput = wavelengths.products(throughput, weight)
         eta *= sample.eta
         goes_on = active & (depth + 1 < rules.max_depth) & si.is_valid() & passes
         depth[si.is_valid()] += 1
@@ -348,17 +344,17 @@ def _sample_emitters(
         chosen, chance, rest = guide.choose(cell, x, active)
         emitter = dr.gather(mi.EmitterPtr, guide.emitters, chosen, active)
         point = mi.Point2f(rest, y - dr.floor(y))
-        ds, radiance = each_direction(waves, emitter, si, point, active)
+        ds, radiance = wavelengths.each_direction(waves, emitter, si, point, active)
         lit = active & (ds.pdf != 0)
         expected = chance * mi.Float(count)
-        bsdf_value, bsdf_pdf = each_bsdf_value(waves, bsdf, si, si.to_local(ds.d), lit)
+        bsdf_value, bsdf_pdf = wavelengths.each_bsdf_value(waves, bsdf, si, si.to_local(ds.d), lit)
         mis = dr.select(ds.delta, 1, _mis(ds.pdf * expected, bsdf_pdf))
-        contribution = products(carried, bsdf_value, radiance, mis)
+        contribution = wavelengths.products(carried, bsdf_value, radiance, mis)
         # No shadow ray is needed outside the cone of a spot, or below the surface.
-        lit &= is_any(contribution)
+        lit &= wavelengths.is_any(contribution)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         guide.learn(cell, chosen, waves.gray(contribution), is_sampled=active, lit=lit)
-        arriving = waves.light(products(contribution, dr.rcp(expected)))
+        arriving = waves.light(wavelengths.products(contribution, dr.rcp(expected)))
         planes.add(place, emitter, arriving, ds.d, ds.uv, depth + 1, lit)
         k += 1
         active &= k < count

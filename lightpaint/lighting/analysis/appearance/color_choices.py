@@ -19,15 +19,9 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduce_lights, whites_for
+from lightpaint.lighting.loss import reweighting
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.reweighting import (
-    RoundsResult,
-    WeightTerms,
-    relative_change,
-    run_rounds,
-    sample_pixels,
-)
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, ViewsReading, around_of, wash_of
 from lightpaint.lighting.solution import Solution
@@ -142,14 +136,16 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(weights))
     part = lit
     if np.count_nonzero(loss.importance) > size:
-        part = sample_pixels(lit, np.einsum("cii->ic", solution.equations.M), size)
+        part = reweighting.sample_pixels(lit, np.einsum("cii->ic", solution.equations.M), size)
 
-    def descend(problem: Problem, begin: Doubles) -> RoundsResult:
+    def descend(problem: Problem, begin: Doubles) -> reweighting.RoundsResult:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
             return solve_reduced(problem.with_pull(equations), problem.reduction, begin).weights
 
-        terms = WeightTerms(problem.pull)
-        return run_rounds(part, terms, begin, solve, from_clipping=False, until=LAST_STEP)
+        terms = reweighting.WeightTerms(problem.pull)
+        return reweighting.run_rounds(
+            part, terms, begin, solve, from_clipping=False, until=LAST_STEP
+        )
 
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
@@ -157,7 +153,10 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
         for _ in range(MAX_WHITE_STEPS if problem.reduction.has_choices else 0):
             equations = problem.with_pull(descent.equations)
             reduction, optimum = next_whites(equations, problem.reduction, descent.weights)
-            if relative_change(descent.equations, descent.weights, optimum.weights) <= LAST_STEP:
+            if (
+                reweighting.relative_change(descent.equations, descent.weights, optimum.weights)
+                <= LAST_STEP
+            ):
                 break
             problem = problem.with_whites(reduction)
             descent = descend(problem, optimum.weights)

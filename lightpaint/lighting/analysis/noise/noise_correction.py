@@ -28,13 +28,7 @@ from lightpaint.basis import BLOCK_PIXELS, Basis, Planes, as_planes
 from lightpaint.errors import BasisError, LightpaintError, SizeError
 from lightpaint.images import Estimate, SurfaceFilter, box_mean
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.basis_noise import (
-    Noise,
-    denoised_matrix,
-    gradient_bias,
-    noise_sums,
-    pseudo_inverse,
-)
+from lightpaint.lighting.analysis.noise import basis_noise
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.analysis.noise.weight_directions import free_directions, solve_for
 from lightpaint.lighting.joined_views import joint_basis
@@ -110,8 +104,8 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     M = problem.solved.M
     basis_residual = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
-    sums = noise_sums(solution)
-    noisy_weights, lacking = gradient_bias(solution, sums)
+    sums = basis_noise.noise_sums(solution)
+    noisy_weights, lacking = basis_noise.gradient_bias(solution, sums)
     # The error of the gradient there, and the error by the noise in M on the way here.
     remains = 1 - problem.noise_removed
     lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - noisy_weights)
@@ -143,7 +137,7 @@ def _render_share(
     bias, spread = 0.0, np.zeros(2)
     M = solution.problem.with_pull(solution.problem.solved).full_matrix
     for directions in free_directions(solution):
-        inverse = pseudo_inverse(directions.T @ M @ directions)
+        inverse = basis_noise.pseudo_inverse(directions.T @ M @ directions)
         lacks = directions.T @ lacking.ravel()
         bias += float(lacks @ inverse @ lacks)
         for k, noise in enumerate((from_basis, rendered)):
@@ -277,14 +271,14 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         )
     if solution.problem.block_side > 1:
         return solution
-    noise, e = noise_sums(solution, removed=1), solution.equations
+    noise, e = basis_noise.noise_sums(solution, removed=1), solution.equations
     if share is None and _has_noise_of_target(solution, noise):
         return _solved(solution, e, 0.0)
     base = e
     if can_smooth(solution.problem.views.bases):
         smooth = on_smooth_light(solution)
-        base, noise = smooth.equations, noise_sums(smooth, removed=1)
-    least = denoised_matrix(base, noise.power)
+        base, noise = smooth.equations, basis_noise.noise_sums(smooth, removed=1)
+    least = basis_noise.denoised_matrix(base, noise.power)
     if share is None:
         share = _best_share(solution, base, noise, least)
 
@@ -315,7 +309,7 @@ def _solved(solution: Solution, corrected: NormalEquations, share: float) -> Sol
     return solve_again(solution, problem)
 
 
-def _has_noise_of_target(solution: Solution, noise: Noise) -> bool:
+def _has_noise_of_target(solution: Solution, noise: basis_noise.Noise) -> bool:
     """Return True for a target that is a sum of this basis, as a template is."""
     objective = solution.equations.objective(solution.weights).sum()
     return bool(objective < SAME_NOISE_SHARE * noise.objective_noise.sum())
@@ -371,7 +365,7 @@ class NoiselessLoss:
 
 
 def _best_share(
-    solution: Solution, equations: NormalEquations, noise: Noise, least: Doubles
+    solution: Solution, equations: NormalEquations, noise: basis_noise.Noise, least: Doubles
 ) -> float:
     """Return the share s with the least expected excess of the objective, of SHARE_STEPS steps.
 
@@ -393,6 +387,6 @@ def _best_share(
         )
         C = directions.T @ noise.gradient.reshape(3 * n, 3 * n) @ directions
         for k, s in enumerate(shares):
-            inverse = pseudo_inverse((1 - s) * M + s * noiseless + stiff)
+            inverse = basis_noise.pseudo_inverse((1 - s) * M + s * noiseless + stiff)
             cost[k] += np.einsum("ij,ji->", M, inverse @ C @ inverse)
     return float(shares[np.argmin(cost)])
