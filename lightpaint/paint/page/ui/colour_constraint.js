@@ -1,7 +1,7 @@
 /** Controls for the colours that one light may have. */
 
 import { html } from '../vendor/preact.js';
-import { Button, NumberField, Select, useDraft } from './controls.js';
+import { Button, NumberField, Select, TextField } from './controls.js';
 import { atFullBrightness, toHex, toKelvin } from './paint_colour.js';
 import { t } from '../language/language.js';
 
@@ -39,7 +39,7 @@ export function ColourConstraint(props) {
     ${kind === 'kelvin' && html`<${WhiteRange} ...${props} otherConstraints=${otherConstraints} />`}
     ${
       kind === 'primaries' &&
-      html`<${TextField} label=${t('LEDs')} value=${[...primaries].join(', ')}
+      html`<${Words} label=${t('LEDs')} value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
         set({
           ...otherConstraints,
@@ -55,7 +55,7 @@ function SingleColour({ constraints, otherConstraints, rgb, set }) {
     : String(constraints.color);
   const white = toKelvin(rgb);
   return html`<div class="ask-row">
-    <${TextField} label=${t('Hex or kelvin')} value=${text}
+    <${Words} label=${t('Hex or kelvin')} value=${text}
       take=${(/** @type {string} */ color) => set({ ...otherConstraints, color })} />
     ${
       white &&
@@ -92,23 +92,8 @@ function WhiteRange({ constraints, otherConstraints, set }) {
 }
 
 /** @param {{label: string, value: string, take: (text: string) => void}} props */
-function TextField({ label, value, take }) {
-  const [draft, setDraft, draftRef] = useDraft();
-  const commit = () => {
-    const text = draftRef.current?.trim();
-    setDraft(null);
-    if (text && text !== value) take(text);
-  };
-  const press = (/** @type {KeyboardEvent} */ { key }) => {
-    if (key === 'Enter') commit();
-    if (key === 'Escape') setDraft(null);
-  };
-  return html`<label class="field words" data-tip=${value.length > 16 ? value : undefined}
-    ><span class="name">${label}</span>
-    <input type="text" value=${draft ?? value} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
-      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)} onBlur=${commit}
-      onKeyDown=${press} /></label>`;
-}
+const Words = (props) =>
+  html`<${TextField} class="words" tip=${props.value.length > 16 ? props.value : undefined} ...${props} />`;
 
 /** @param {RGB} rgb */
 const hexOf = (rgb) => toHex(atFullBrightness(rgb));

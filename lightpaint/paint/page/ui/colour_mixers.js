@@ -12,7 +12,7 @@ import {
   toKelvin,
 } from './paint_colour.js';
 import { ColourWheel } from './colour_wheel.js';
-import { Slider, useDraft } from './controls.js';
+import { Slider, TextField } from './controls.js';
 import { KelvinSlider, gradient, clampKelvin } from './kelvin_slider.js';
 import { t } from '../language/language.js';
 
@@ -28,22 +28,11 @@ export const MIXERS = [
 
 /** @param {{colour: RGB, set: SetColour}} props */
 export function Hex({ colour, set }) {
-  const [draft, setDraft, draftRef] = useDraft();
   const take = (/** @type {string} */ text) => {
     const rgb = fromHex(text);
-    setDraft(null);
     if (rgb) set(rgb, true);
   };
-  const press = (/** @type {any} */ { key, currentTarget }) => {
-    if (key === 'Enter') take(currentTarget.value);
-    if (key === 'Escape') setDraft(null);
-  };
-  return html`<label class="field hex"><span class="only-read">${t('Hex')}</span>
-    <input type="text" value=${draft ?? toHex(colour)} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
-      maxlength="7"
-      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
-      onBlur=${() => draftRef.current !== null && take(draftRef.current)}
-      onKeyDown=${press} /></label>`;
+  return html`<${TextField} class="hex" hidden label=${t('Hex')} value=${toHex(colour)} maxLength=${7} take=${take} />`;
 }
 
 /** @param {{colour: RGB, set: SetColour, isPure?: boolean}} props isPure: a new temperature is on

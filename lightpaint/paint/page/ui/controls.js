@@ -103,6 +103,30 @@ export function Checkbox({ label, checked, change, tip, disabled, keys, hidden }
 }
 
 /**
+ * A line of text, taken on Enter or when the field loses focus, cancelled by Escape. `take` gets text
+ * that is neither empty nor the old one. tip: of text that may not fit.
+ * @param {{label: string, value: string, take: (text: string) => void, class: string, maxLength?: number,
+ *   hidden?: boolean, tip?: string}} props
+ */
+export function TextField({ label, value, take, class: kind, maxLength, hidden, tip }) {
+  const [draft, setDraft, draftRef] = useDraft();
+  const commit = () => {
+    const text = draftRef.current?.trim();
+    setDraft(null);
+    if (text && text !== value) take(text);
+  };
+  const press = (/** @type {KeyboardEvent} */ { key }) => {
+    if (key === 'Enter') commit();
+    if (key === 'Escape') setDraft(null);
+  };
+  return html`<label class=${`field ${kind}`} data-tip=${tip}
+    ><span class=${hidden ? 'only-read' : 'name'}>${label}</span>
+    <input type="text" value=${draft ?? value} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
+      maxlength=${maxLength} onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
+      onBlur=${commit} onKeyDown=${press} /></label>`;
+}
+
+/**
  * A typed number: taken on Enter or when the field loses focus, cancelled by Escape, stepped by the
  * arrow keys. digits: after the point; figures: significant digits that are shown, instead, while a
  * typed number is taken in full. start: value from which the keys step in an empty field. For text that

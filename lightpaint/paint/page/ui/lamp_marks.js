@@ -26,6 +26,7 @@ import { t } from '../language/language.js';
 /** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
 /** @typedef {import("../engine/messages.js").Camera} Camera */
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
+/** @typedef {{x: number, y: number}} Point */
 
 /** CSS pixels between the edge and a mark of a light outside the picture. */
 const MARK_MARGIN = 14;
@@ -266,8 +267,6 @@ function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
  *   toPage: (projection: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Trials({ ui, camera, box, toPage }) {
   if (!ui.trial) return null;
-  const { left, top, right, bottom } = box;
-  const style = { left: `${left}px`, top: `${top}px` };
   const { positions, directions } = ui.trial;
   const marks = Object.entries(positions).flatMap(([name, position]) => {
     const start = toPage(project(camera, position));
@@ -276,12 +275,7 @@ function Trials({ ui, camera, box, toPage }) {
       direction && toPage(project(camera, add(position, direction, ARROW_ROOM_SHARE * sizeOf(ui))));
     return start.isAhead ? [{ name, start, end: end?.isAhead ? end : null }] : [];
   });
-  return html`<svg class="lamp-beam is-trial" style=${style} width=${right - left}
-    height=${bottom - top} aria-hidden="true">${marks.map(
-      ({ name, start, end }) => html`<g key=${name}>
-        ${end && html`<line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left} y2=${end.y - top} />`}
-        <circle cx=${start.x - left} cy=${start.y - top} r="8" /></g>`,
-    )}</svg>`;
+  return html`<${Lines} class="is-trial" box=${box} lines=${marks} radius=${8} />`;
 }
 
 /** The diagonal of the room. @param {Ui} ui */
@@ -292,8 +286,6 @@ function sizeOf({ rig }) {
 /** The places of lights before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
  *   toPage: (projection: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Ghosts({ ui, camera, box, toPage }) {
-  const { left, top, right, bottom } = box;
-  const style = { left: `${left}px`, top: `${top}px` };
   const moves = ui.lights.flatMap(({ name }, k) => {
     const [oldPosition, newPosition] = [ui.ghosts[name], placeOf(ui, k)?.position];
     if (!oldPosition || !newPosition || !(name in ui.poses)) return [];
@@ -301,12 +293,7 @@ function Ghosts({ ui, camera, box, toPage }) {
     return start.isAhead && end.isAhead ? [{ name, start, end }] : [];
   });
   if (!moves.length) return null;
-  return html`<svg class="lamp-beam is-ghost" style=${style} width=${right - left}
-    height=${bottom - top} aria-hidden="true">${moves.map(
-      ({ name, start, end }) => html`<g key=${name}>
-        <line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left} y2=${end.y - top} />
-        <circle cx=${start.x - left} cy=${start.y - top} r="7" /></g>`,
-    )}</svg>`;
+  return html`<${Lines} class="is-ghost" box=${box} lines=${moves} radius=${7} />`;
 }
 
 /** The line from a light to its target. @param {{place: LightPlace, camera: Camera, box: Box,
@@ -317,9 +304,18 @@ function Beam({ place, camera, box, toPage }) {
     toPage(project(camera, point)),
   );
   if (!start.isAhead || !end.isAhead) return null;
+  return html`<${Lines} box=${box} lines=${[{ name: '', start, end }]} />`;
+}
+
+/** Lines over the picture, from places of lights; with a radius, circles there.
+ * @param {{box: Box, lines: {name: string, start: Point, end: Point | null}[], class?: string,
+ *   radius?: number}} props */
+function Lines({ box, lines, class: kind = '', radius }) {
   const { left, top, right, bottom } = box;
-  const style = { left: `${left}px`, top: `${top}px` };
-  return html`<svg class="lamp-beam" style=${style} width=${right - left} height=${bottom - top}
-    aria-hidden="true"><line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left}
-      y2=${end.y - top} /></svg>`;
+  return html`<svg class=${`lamp-beam ${kind}`} style=${{ left: `${left}px`, top: `${top}px` }}
+    width=${right - left} height=${bottom - top} aria-hidden="true">${lines.map(
+      ({ name, start, end }) => html`<g key=${name}>
+        ${end && html`<line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left} y2=${end.y - top} />`}
+        ${radius && html`<circle cx=${start.x - left} cy=${start.y - top} r=${radius} />`}</g>`,
+    )}</svg>`;
 }

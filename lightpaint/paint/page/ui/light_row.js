@@ -3,19 +3,12 @@
 import { Component, html } from '../vendor/preact.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
 import { LightConstraints } from './light_constraints.js';
-import { Button, Slider } from './controls.js';
 import { numberText, percentText, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
 import { LampFields } from './lamp_fields.js';
 import { isSelecting, pressLight } from './lamps/light_selection.js';
-import {
-  DIMMER_MAX_STOPS,
-  DIMMER_MIN_STOPS,
-  LevelField,
-  scaleToLevel,
-  presentLevel,
-  stopsOf,
-} from './level_field.js';
+import { DIMMER_MIN_STOPS, scaleToLevel, presentLevel, stopsOf } from './level_field.js';
+import { Dimmer, DisplayButtons, LightValue, LockButton, Pick, Share } from './row_parts.js';
 import { Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
 
@@ -78,11 +71,7 @@ export class LightRow extends Component {
         <${Thumbnail} name=${this.props.picture} generation=${this.props.thumb} app=${app} />
         <${Share} share=${this.props.answer?.share ?? 0} pointerShare=${pointerShare} />
         <${Badge} ...${this.props} />
-        <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
-          aria-label=${t('Select {label}', { label: light.label })} onClick=${select}
-          data-tip=${t('Select, for one action on several lights; with Shift all from the last one')}>${
-            isSelected && html`<${Icon} name="check" />`
-          }</button>
+        <${Pick} label=${light.label} isSelected=${isSelected} select=${select} />
       </div>
       <div class="light-main">
         <div class="light-head">
@@ -109,27 +98,15 @@ export class LightRow extends Component {
   renderButtons() {
     const { k, light, app, isSolo, isMute, constraints = {} } = this.props;
     const { store, session } = app;
-    const toggleDisplay = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
-      store.set((ui) => ({ [key]: on ? ui[key].filter((other) => other !== k) : [...ui[key], k] }));
+    const toggle = (/** @type {"solo" | "mute"} */ key) => store.set((ui) => ({ [key]: toggled(ui[key], k) }));
     const isLocked = constraints.lock !== undefined || Boolean(constraints.off);
     const lock = () =>
       isLocked ? session.unlockLight(k) : session.lockLight(k, this.props.rgb, true);
-    return html`<span class="marks" role="group" aria-label=${t('Display', { context: 'verb' })}>
-      <${Button} label=${t('S')} class="letter" pressed=${isSolo} act=${() => toggleDisplay('solo', isSolo)}
-        tip=${t('Solo: show {label} alone. The answer does not change.', { label: light.label })} />
-      <${Button} label=${t('M')} class="letter" pressed=${isMute} act=${() => toggleDisplay('mute', isMute)}
-        tip=${t('Mute: show the picture without {label}. The answer does not change.', { label: light.label })} />
-    </span>
+    return html`<${DisplayButtons} label=${light.label} isSolo=${isSolo} isMute=${isMute} toggle=${toggle} />
     ${
       !light.is_fixed &&
-      html`<span class="marks is-solve" role="group"
-      aria-label=${t('Solve')}>
-      <${Button} icon="lock" pressed=${isLocked} act=${lock} tip=${
-        isLocked
-          ? t('Unlock {label}: the solve sets it again', { label: light.label })
-          : t('Lock {label} as it is in the answer', { label: light.label })
-      } />
-    </span>`
+      html`<span class="marks is-solve" role="group" aria-label=${t('Solve')}>
+        <${LockButton} label=${light.label} isLocked=${isLocked} lock=${lock} /></span>`
     }`;
   }
 
@@ -147,10 +124,7 @@ export class LightRow extends Component {
     const fullText = [value, light.unit, isLive ? '' : error].filter(Boolean).join(' ');
     // The error bar of the previous answer stays until the next one is known.
     return html`<div class=${`light-numbers ${this.props.hasSlider ? '' : 'is-two'}`}>
-      <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
-        style=${{ background: level > 0 ? swatch : 'none' }}></span>
-      <span class="values" data-tip=${level > 0 ? fullText : undefined}
-        >${level > 0 ? value : t('off')}</span>
+      <${LightValue} level=${level} swatch=${swatch} value=${value} tip=${fullText} />
       ${
         this.props.isKept
           ? html`<${KeptButton} ...${this.props} />`
@@ -163,21 +137,14 @@ export class LightRow extends Component {
 
   renderDimmer() {
     const { k, light, rgb, app, constraints } = this.props;
-    const stops = stopsOf(rgb, light) ?? DIMMER_MIN_STOPS;
-    const move = (/** @type {number} */ newStops, /** @type {boolean} */ isFinal) => {
+    const scale = (/** @type {number} */ newStops, /** @type {boolean} */ isFinal) => {
       this.dragStartColour ??= rgb;
       app.session.lockLight(k, scaleToStops(this.dragStartColour, light, newStops), isFinal);
       if (isFinal) this.dragStartColour = null;
     };
-    const text = luminance(rgb) > 0 ? stopsText(stops) : t('off');
-    return html`<div class=${`dimmer ${constraints?.lock !== undefined ? 'is-held' : ''}`}>
-      <${Slider} plain label=${t('{label}, stops from now', { label: light.label })} value=${clampStops(stops)}
-        min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0} text=${text}
-        disabled=${Boolean(constraints?.off)} change=${move} />
-      <${LevelField} light=${light} rgb=${rgb} disabled=${Boolean(constraints?.off)}
-        say=${(/** @type {string} */ words) => app.session.toast(words)}
-        change=${(/** @type {RGB} */ newRgb) => app.session.lockLight(k, newRgb, true)} />
-    </div>`;
+    return html`<${Dimmer} light=${light} rgb=${rgb} label=${light.label} app=${app} scale=${scale}
+      isHeld=${constraints?.lock !== undefined} disabled=${Boolean(constraints?.off)}
+      change=${(/** @type {RGB} */ newRgb) => app.session.lockLight(k, newRgb, true)} />`;
   }
 }
 
@@ -198,15 +165,6 @@ function Name({ name }) {
 
 /** @param {number | undefined} share */
 const shareText = (share) => (share === undefined ? '' : percentText(share));
-
-/** @param {{share: number, pointerShare?: number}} props */
-export function Share({ share, pointerShare }) {
-  const isAtPointer = pointerShare !== undefined;
-  const value = isAtPointer ? pointerShare : share;
-  return html`<span class=${`share ${isAtPointer ? 'is-here' : ''}`}
-    data-tip=${isAtPointer ? t('Share of the light here') : t("Share of the picture's light")}>
-    <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
-}
 
 /** The drives of a lamp's emitters, a bar for each. Below them, universe and channel on a console,
  * and the slot of a colour wheel with how far it is from the colour of the solve.
@@ -261,12 +219,11 @@ function KeptButton({ k, light, app }) {
 
 /** @param {import("./ui_state.js").UiStore} store @param {number} k */
 function toggleRow(store, k) {
-  store.set(({ openLights }) => ({
-    openLights: openLights.includes(k)
-      ? openLights.filter((other) => other !== k)
-      : [...openLights, k],
-  }));
+  store.set(({ openLights }) => ({ openLights: toggled(openLights, k) }));
 }
+
+/** Return a list with an entry or, where it has it, without. @param {number[]} list @param {number} k */
+const toggled = (list, k) => (list.includes(k) ? list.filter((other) => other !== k) : [...list, k]);
 
 /** Return the colour constraint, if there is one. @param {Constraints} constraints */
 const colourConstraint = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
@@ -294,9 +251,6 @@ function listRemarks({ light, answer, constraints = {}, tie, isKept }) {
   ];
   return remarks.filter(([applies]) => applies).map(([, ...texts]) => texts);
 }
-
-/** Return stops within the ends of the dimmer. @param {number} stops */
-export const clampStops = (stops) => Math.min(DIMMER_MAX_STOPS, Math.max(DIMMER_MIN_STOPS, stops));
 
 /** Return the same colour at a number of stops from the current level; the left end is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */

@@ -1,17 +1,11 @@
 /** A row of the light list for a light that is an image: its map, solo, mute, lock and brightness. */
 
 import { html } from '../../vendor/preact.js';
-import { Button, Slider } from '../controls.js';
-import { numberText, stopsText, whiteText } from '../format.js';
+import { Button } from '../controls.js';
+import { numberText, whiteText } from '../format.js';
 import { Icon } from '../icons.js';
-import {
-  DIMMER_MAX_STOPS,
-  DIMMER_MIN_STOPS,
-  LevelField,
-  presentLevel,
-  stopsOf,
-} from '../level_field.js';
-import { Share, clampStops } from '../light_row.js';
+import { DIMMER_MIN_STOPS, presentLevel } from '../level_field.js';
+import { Dimmer, DisplayButtons, LightValue, LockButton, Pick, Share } from '../row_parts.js';
 import { isSelecting, toggleLights } from '../lamps/light_selection.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
 import { plural, t } from '../../language/language.js';
@@ -54,9 +48,7 @@ export function ImageRow({ image, ui, app }) {
       <${ImageMap} image=${image} weights=${ui.weights} stops=${exposureOf(ui, image)} />
       <${Share} share=${share} pointerShare=${pointerShare} />
       ${held.length > 0 && html`<span class="badge" data-tip=${heldText}>${t('{count} locked', { count: held.length })}</span>`}
-      <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
-        aria-label=${t('Select {label}', { label: name })} onClick=${() => toggleLights(store, lights)}
-        data-tip=${t('Select, for one action on several lights; with Shift all from the last one')}>${isSelected && html`<${Icon} name="check" />`}</button>
+      <${Pick} label=${name} isSelected=${isSelected} select=${() => toggleLights(store, lights)} />
     </div>
     <div class="light-main">
       <div class="light-head">
@@ -82,23 +74,17 @@ function Buttons({ image, ui, app, held }) {
   const { name: label, lights } = image;
   const { store, session } = app;
   const areIn = (/** @type {"solo" | "mute"} */ key) => lights.every((k) => ui[key].includes(k));
-  const toggle = (/** @type {"solo" | "mute"} */ key) => () => {
+  const toggle = (/** @type {"solo" | "mute"} */ key) => {
     const others = ui[key].filter((k) => !lights.includes(k));
     store.set({ [key]: areIn(key) ? others : [...others, ...lights] });
   };
   const isLocked = held.length === lights.length;
   const lock = () => void (isLocked ? session.many.unlock(lights) : session.many.lock(lights));
-  return html`<span class="marks" role="group" aria-label=${t('Display', { context: 'verb' })}>
-      <${Button} label=${t('S')} class="letter" pressed=${areIn('solo')} act=${toggle('solo')}
-        tip=${t('Solo: show {label} alone. The answer does not change.', { label })} />
-      <${Button} label=${t('M')} class="letter" pressed=${areIn('mute')} act=${toggle('mute')}
-        tip=${t('Mute: show the picture without {label}. The answer does not change.', { label })} />
-    </span>
+  return html`<${DisplayButtons} label=${label} isSolo=${areIn('solo')} isMute=${areIn('mute')} toggle=${toggle} />
     <span class="marks is-solve" role="group" aria-label=${t('Solve')}>
       <${Button} icon="undo" disabled=${!held.length} act=${() => session.images.reset(image)}
         tip=${t('Reset {label}: the solve sets all texels again', { label })} />
-      <${Button} icon="lock" pressed=${isLocked} act=${lock}
-        tip=${isLocked ? t('Unlock {label}: the solve sets it again', { label }) : t('Lock {label} as it is in the answer', { label })} />
+      <${LockButton} label=${label} isLocked=${isLocked} lock=${lock} />
     </span>`;
 }
 
@@ -111,10 +97,8 @@ function Numbers({ image, ui }) {
   const value = [white, numberText(level)].filter(Boolean).join(' · ');
   const { unit } = ui.lights[image.lights[0]];
   return html`<div class="light-numbers">
-    <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
-      style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
-    <span class="values" data-tip=${level > 0 ? t('{value} {unit}, mean of the image', { value, unit }) : undefined}
-      >${level > 0 ? value : t('off')}</span>
+    <${LightValue} level=${level} swatch=${toHex(atFullBrightness(rgb))} value=${value}
+      tip=${t('{value} {unit}, mean of the image', { value, unit })} />
   </div>`;
 }
 
@@ -123,19 +107,8 @@ function Brightness({ image, ui, app, isHeld }) {
   const { images } = app.session;
   const light = wholeLight(image, ui.lights);
   const rgb = meanOf(image, (k) => ui.weights[k] ?? ui.lights[k].present);
-  const stops = stopsOf(rgb, light) ?? DIMMER_MIN_STOPS;
-  const move = (/** @type {number} */ newStops, /** @type {boolean} */ isFinal) =>
-    images.scale(
-      image,
-      newStops <= DIMMER_MIN_STOPS ? 0 : presentLevel(light) * 2 ** newStops,
-      isFinal,
-    );
-  return html`<div class=${`dimmer ${isHeld ? 'is-held' : ''}`}>
-    <${Slider} plain label=${t('{label}, stops from now', { label: image.name })} value=${clampStops(stops)}
-      min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0}
-      text=${luminance(rgb) > 0 ? stopsText(stops) : t('off')} change=${move} />
-    <${LevelField} light=${light} rgb=${rgb} disabled=${false}
-      say=${(/** @type {string} */ text) => app.session.toast(text)}
-      change=${(/** @type {RGB} */ newRgb) => images.scale(image, luminance(newRgb), true)} />
-  </div>`;
+  const scale = (/** @type {number} */ stops, /** @type {boolean} */ isFinal) =>
+    images.scale(image, stops <= DIMMER_MIN_STOPS ? 0 : presentLevel(light) * 2 ** stops, isFinal);
+  return html`<${Dimmer} light=${light} rgb=${rgb} label=${image.name} app=${app} scale=${scale} isHeld=${isHeld}
+    change=${(/** @type {RGB} */ newRgb) => images.scale(image, luminance(newRgb), true)} />`;
 }

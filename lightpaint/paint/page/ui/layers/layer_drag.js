@@ -1,11 +1,9 @@
 /** Dragging a layer to another place of the list, by mouse, pen or finger. */
 
+import { dragItem } from '../item_drag.js';
 import { movedLayer } from './layer_order.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
-
-/** Pixels after which a press is a drag. */
-const THRESHOLD = 5;
 
 /** Pixels from the left of the list beyond which a layer below a group's last member joins it. */
 const INDENT = 24;
@@ -19,35 +17,16 @@ export function dragLayer(event, app) {
   const row = /** @type {HTMLElement | null} */ (target.closest('[data-layer]'));
   if (!row || !isHandle || event.button !== 0) return;
   const list = /** @type {HTMLElement} */ (event.currentTarget);
-  const ends = new AbortController();
-  const { signal } = ends;
   const id = Number(row.dataset.layer);
-  const start = event.clientY;
-  let isDragged = false;
-  const finish = (/** @type {boolean} */ isDropped, /** @type {PointerEvent | null} */ last) => {
-    ends.abort();
-    const place = isDropped && isDragged && last ? placeAt(list, last, id) : null;
-    for (const one of list.querySelectorAll('[data-drop]')) delete /** @type {any} */ (one).dataset.drop;
-    row.classList.remove('is-dragged');
-    if (!isDragged) return;
-    // The press that ends a drag chooses nothing.
-    list.addEventListener('click', (click) => click.stopPropagation(), { capture: true, once: true });
-    setTimeout(() => list.dispatchEvent(new Event('click')), 0);
-    if (place) app.engine.changeLayers(movedLayer(app.store.value.layers, id, place.before, place.group));
-  };
-  const move = (/** @type {PointerEvent} */ now) => {
-    if (!isDragged && Math.abs(now.clientY - start) < THRESHOLD) return;
-    isDragged = true;
-    app.store.set({ hoveredLayer: null });
-    row.classList.add('is-dragged');
-    mark(list, placeAt(list, now, id));
-  };
-  window.addEventListener('pointermove', move, { signal });
-  window.addEventListener('pointerup', (up) => finish(true, up), { signal });
-  window.addEventListener('pointercancel', () => finish(false, null), { signal });
-  window.addEventListener('keydown', (key) => key.key === 'Escape' && finish(false, null), {
-    signal,
-    capture: true,
+  dragItem(event, row, {
+    move: (now) => {
+      app.store.set({ hoveredLayer: null });
+      mark(list, placeAt(list, now, id));
+    },
+    drop: (last) => {
+      const place = placeAt(list, last, id);
+      if (place) app.engine.changeLayers(movedLayer(app.store.value.layers, id, place.before, place.group));
+    },
   });
   if (isGrip) event.preventDefault();
 }

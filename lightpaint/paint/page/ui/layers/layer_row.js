@@ -3,7 +3,7 @@
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 import { renamed } from '../../engine/layers/layer_names.js';
 import { warmer } from '../../../../viewer/drawing/colour.js';
-import { Button, NumberField, Slider, useDraft } from '../controls.js';
+import { Button, NumberField, Slider, TextField } from '../controls.js';
 import { GradientFields } from '../selection/gradient_fields.js';
 import { Icon } from '../icons.js';
 import { chooseTool } from '../tools.js';
@@ -193,21 +193,9 @@ function miredOf(tint) {
 
 /** @param {{layer: Layer, set: (made: Partial<Layer>, label: string) => void}} props */
 function LayerName({ layer, set }) {
-  const [typed, setTyped, now] = useDraft();
-  const take = (/** @type {string} */ text) => {
-    setTyped(null);
-    const name = text.trim();
-    if (name && name !== layer.name) set({ name }, t('rename layer'));
-  };
-  const press = (/** @type {any} */ { key, currentTarget }) => {
-    if (key === 'Enter') take(currentTarget.value);
-    if (key === 'Escape') setTyped(null);
-  };
-  return html`<label class="field layer-label" data-tip=${layer.name.length > 20 ? layer.name : undefined}><span class="name">${t('Name')}</span>
-    <input type="text" value=${typed ?? layer.name} maxlength="80" autocomplete="off" spellcheck=${false}
-      data-typed=${typed === null ? 'no' : 'yes'} onKeyDown=${press}
-      onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-      onBlur=${() => now.current !== null && take(now.current)} /></label>`;
+  const take = (/** @type {string} */ name) => set({ name }, t('rename layer'));
+  return html`<${TextField} class="layer-label" label=${t('Name')} value=${layer.name} maxLength=${80} take=${take}
+    tip=${layer.name.length > 20 ? layer.name : undefined} />`;
 }
 
 /** Choose a layer; with Ctrl or Shift, others beside it. @param {MouseEvent} event @param {App} app

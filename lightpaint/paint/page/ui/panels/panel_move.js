@@ -1,12 +1,10 @@
 /** Moving a side panel to another place: a drag of its title or its grip, or the arrow keys with Alt. */
 
 import { t } from '../../language/language.js';
+import { dragItem } from '../item_drag.js';
 import { withPanelBefore, withPanelStepped } from './panel_order.js';
 
 /** @typedef {import("../ui_state.js").UiStore} UiStore */
-
-/** Pixels after which a press on a title is a drag. */
-const THRESHOLD = 6;
 
 /** @param {Element} side @returns {HTMLElement[]} */
 const panelsIn = (side) => [...side.querySelectorAll(':scope > [data-panel]')].map((one) => /** @type {HTMLElement} */ (one));
@@ -22,30 +20,10 @@ export function dragPanel(event, store) {
   const panel = /** @type {HTMLElement | null} */ (handle?.closest('[data-panel]') ?? null);
   const side = /** @type {HTMLElement} */ (event.currentTarget);
   if (!panel || panel.parentElement !== side || event.button !== 0) return;
-  const [start, ends] = [event.clientY, new AbortController()];
-  const { signal } = ends;
-  let isDragged = false;
-  const finish = (/** @type {PointerEvent | null} */ drop) => {
-    ends.abort();
-    panel.classList.remove('is-dragged');
-    for (const one of panelsIn(side)) delete one.dataset.drop;
-    if (!isDragged) return;
-    // The press that ends a drag folds nothing.
-    side.addEventListener('click', (click) => click.stopPropagation(), { capture: true, once: true });
-    setTimeout(() => side.dispatchEvent(new Event('click')));
-    if (drop) movePanel(store, side, nameOf(panel), placeBelow(side, drop.clientY));
-  };
-  const move = (/** @type {PointerEvent} */ now) => {
-    if (!isDragged && Math.abs(now.clientY - start) < THRESHOLD) return;
-    isDragged = true;
-    panel.classList.add('is-dragged');
-    markPlace(side, placeBelow(side, now.clientY));
-  };
-  window.addEventListener('pointermove', move, { signal });
-  window.addEventListener('pointerup', finish, { signal });
-  window.addEventListener('pointercancel', () => finish(null), { signal });
-  const cancel = (/** @type {KeyboardEvent} */ { key }) => key === 'Escape' && finish(null);
-  window.addEventListener('keydown', cancel, { signal, capture: true });
+  dragItem(event, panel, {
+    move: ({ clientY }) => markPlace(side, placeBelow(side, clientY)),
+    drop: ({ clientY }) => movePanel(store, side, nameOf(panel), placeBelow(side, clientY)),
+  });
 }
 
 /** Return the name of the panel that a drag at a height would come before; null at the end.
