@@ -46,11 +46,11 @@ sys.path.insert(0, str(ROOT))
 import lightpaint as lp  # noqa: E402
 from lightpaint.basis.light_basis import Basis, Origin  # noqa: E402
 from lightpaint.basis.lights import BasisLight  # noqa: E402
+from lightpaint.dmx.console_link import ConsoleLink  # noqa: E402
+from lightpaint.dmx.console_receiver import ConsoleReceiver  # noqa: E402
+from lightpaint.dmx.console_target import PROTOCOLS, network_universes  # noqa: E402
 from lightpaint.dmx.levels import decode_levels  # noqa: E402
 from lightpaint.dmx.mvr import DESCRIPTION, read_rig  # noqa: E402
-from lightpaint.dmx.network.console_link import ConsoleLink  # noqa: E402
-from lightpaint.dmx.network.console_receiver import ConsoleReceiver  # noqa: E402
-from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes  # noqa: E402
 from lightpaint.lighting.answer.lighting import Lighting  # noqa: E402
 from lightpaint.lighting.unknowns.reduction import reduce_to  # noqa: E402
 from lightpaint.relit.export.fixtures import fixtures_of  # noqa: E402

@@ -28,12 +28,12 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.light_wishes import wished_light
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.wish_problems import with_wishes
-from lightpaint.lighting.wishes.wished_light import wished_light
+from lightpaint.lighting.wish_problems import with_wishes
 from lightpaint.photometry.illuminance import Illuminance, PowerBudget, Wishes
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.planes_file import read_planes

@@ -22,8 +22,8 @@ from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.colour.lamp import MAX_EMITTERS
-from lightpaint.dmx.network.console_link import PRIORITY
-from lightpaint.dmx.network.console_receiver import LOOPBACK, USUAL_PRIORITY
+from lightpaint.dmx.console_link import PRIORITY
+from lightpaint.dmx.console_receiver import LOOPBACK, USUAL_PRIORITY
 from lightpaint.lighting.answer.lighting_file import MAX_BYTES as MAX_LIGHTING
 from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD

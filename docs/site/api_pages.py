@@ -140,7 +140,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "target.painted_target": ("Wish",),
     "lighting.problem": ("Refinement",),
     "lighting.answer.certificate": ("Bound",),
-    "lighting.wishes.planes_answer": ("PlanesAnswer",),
+    "lighting.wish_outcomes": ("PlanesAnswer",),
     "lighting.answer.lighting": ("LightSetting",),
     "lighting.answer.lighting_keys": ("LightingKey",),
     "colour.luminous_flux": ("Photometry",),

@@ -6,8 +6,13 @@ from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     # fmt: off
+    from lightpaint.dmx.console_link import PRIORITY, ConsoleLink, link_address
+    from lightpaint.dmx.console_receiver import LOOPBACK, ConsoleReceiver
     from lightpaint.dmx.console_rig import (
         ConsoleRig, DmxChannel, RigFixture, RigLight, address_text,
+    )
+    from lightpaint.dmx.console_target import (
+        PROTOCOLS, SACN, ConsoleTarget, network_universes, parse_target,
     )
     from lightpaint.dmx.levels import (
         RigDrives, check_drives, check_lamps, decode_levels, drives_of, encode_levels,
@@ -15,11 +20,6 @@ if TYPE_CHECKING:
     from lightpaint.dmx.mvr import (
         DESCRIPTION, KIND, MM, KindSummary, NamedFixture, Show, named_fixtures, read_rig, read_show,
         show_nodes,
-    )
-    from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink, link_address
-    from lightpaint.dmx.network.console_receiver import LOOPBACK, ConsoleReceiver
-    from lightpaint.dmx.network.console_target import (
-        PROTOCOLS, SACN, ConsoleTarget, network_universes, parse_target,
     )
     from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
     from lightpaint.dmx.rig_scene import (

@@ -60,6 +60,9 @@ if TYPE_CHECKING:
         DEFAULT_HOLD, Colors, Emitters, Fit, Space, resolve_fit, resolve_for_targets,
     )
     from lightpaint.lighting.joined_views import check_same_lights, joint_estimate
+    from lightpaint.lighting.light_wishes import (
+        LitCase, WishedLight, check_powers, watts_allowed, wished_light,
+    )
     from lightpaint.lighting.linear_problem import (
         Sums, reason_against_sums, reduce_lights, sum_rows, summed_problem,
     )
@@ -75,12 +78,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
     from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
     from lightpaint.lighting.unknowns.reduction import Reduction, lamps_by_name, reduce_to
-    from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome, planes_answer
-    from lightpaint.lighting.wishes.wish_problems import (
+    from lightpaint.lighting.wish_outcomes import PlanesAnswer, WishOutcome, planes_answer
+    from lightpaint.lighting.wish_problems import (
         RequiredProblem, least_watts, requirements_within_reach, with_wishes, without_wishes,
-    )
-    from lightpaint.lighting.wishes.wished_light import (
-        LitCase, WishedLight, check_powers, watts_allowed, wished_light,
     )
     # fmt: on
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from blender import blender_command, found_in_blender
 
+from lightpaint.dmx.console_link import ConsoleLink
 from lightpaint.dmx.console_rig import UNIVERSE_SIZE
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.dmx.mvr import read_rig
-from lightpaint.dmx.network.console_link import ConsoleLink
 
 SHOW = Path(__file__).parents[2] / "scenes" / "rig" / "show.mvr"
 

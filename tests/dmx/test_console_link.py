@@ -17,11 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import PATIENCE_S
 
+from lightpaint.dmx import console_link
+from lightpaint.dmx.console_link import KEEP_ALIVE_S, ConsoleLink, SendSchedule
+from lightpaint.dmx.console_receiver import ConsoleReceiver
+from lightpaint.dmx.console_target import ARTNET, SACN, network_universes, parse_target
 from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, encode_levels
-from lightpaint.dmx.network import console_link
-from lightpaint.dmx.network.console_link import KEEP_ALIVE_S, ConsoleLink, SendSchedule
-from lightpaint.dmx.network.console_receiver import ConsoleReceiver
-from lightpaint.dmx.network.console_target import ARTNET, SACN, network_universes, parse_target
 from lightpaint.errors import ConsoleError, RigError
 
 RIG = two_lamps()

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import PATIENCE_S
 
-from lightpaint.dmx.network import console_receiver
-from lightpaint.dmx.network.console_receiver import ConsoleReceiver, parse_artnet, parse_sacn
-from lightpaint.dmx.network.console_target import ARTNET, SACN
+from lightpaint.dmx import console_receiver
+from lightpaint.dmx.console_receiver import ConsoleReceiver, parse_artnet, parse_sacn
+from lightpaint.dmx.console_target import ARTNET, SACN
 from lightpaint.errors import ConsoleError
 
 LEVELS, OTHERS = bytes(range(256)) * 2, bytes(512)

@@ -13,12 +13,12 @@ from patience import PATIENCE_S
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
 import lightpaint as lp
+from lightpaint.dmx.console_link import ConsoleLink
+from lightpaint.dmx.console_receiver import ConsoleReceiver
 from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.console_target import PROTOCOLS, network_universes
 from lightpaint.dmx.levels import decode_levels, drives_of
 from lightpaint.dmx.mvr import read_rig
-from lightpaint.dmx.network.console_link import ConsoleLink
-from lightpaint.dmx.network.console_receiver import ConsoleReceiver
-from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes
 from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, room_of_show, scene_text
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.unknowns.reduction import reduce_to

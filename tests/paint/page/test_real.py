@@ -29,9 +29,9 @@ from lightpaint.basis import denoise_mix
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.colour import LUMINANCE
 from lightpaint.colour.primaries import to_8_bit
+from lightpaint.dmx.console_link import ConsoleLink
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import encode_levels
-from lightpaint.dmx.network.console_link import ConsoleLink
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.page_server import Server

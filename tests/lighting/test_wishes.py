@@ -13,17 +13,17 @@ from scipy.optimize import linprog
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.light_wishes import wished_light
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.planes_answer import planes_answer
-from lightpaint.lighting.wishes.wish_problems import (
+from lightpaint.lighting.wish_outcomes import planes_answer
+from lightpaint.lighting.wish_problems import (
     least_watts,
     power_of,
     shares_given_up,
     with_wishes,
 )
-from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import (
     Illuminance,
     LightCase,

@@ -9,7 +9,7 @@ from pyartnet import ArtNetNode
 from pyartnet.base.network import UnicastNetworkTarget
 
 from lightpaint.dmx.console_rig import UNIVERSE_SIZE
-from lightpaint.dmx.network.console_target import ConsoleTarget
+from lightpaint.dmx.console_target import ConsoleTarget
 
 #: The address of all nodes in the network.
 BROADCAST = "255.255.255.255"

@@ -14,12 +14,12 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.required_sums import RequiredSums
 from lightpaint.lighting.constraints.constraint_table import Requirements
+from lightpaint.lighting.light_wishes import WishedLight
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.wishes.wished_light import WishedLight
 from lightpaint.progress import cancellation_check
 
 #: What is given up of a wish is more than its least share by this part of it, so that round-off

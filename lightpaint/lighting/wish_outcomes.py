@@ -11,9 +11,9 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis import Lights
 from lightpaint.errors import ConstraintError
+from lightpaint.lighting.light_wishes import LightWish, WishedLight, check_powers
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.wishes.wished_light import LightWish, WishedLight, check_powers
 from lightpaint.photometry import Glare, GlareReading, PlaneReading
 
 #: Relative shortfall from which a wish is not met: rows are met up to round-off.

@@ -9,7 +9,7 @@ from ipaddress import AddressValueError, IPv4Address
 from typing import Self
 
 from lightpaint.dmx.console_rig import UNIVERSE_SIZE
-from lightpaint.dmx.network.console_target import SACN, DmxProtocol
+from lightpaint.dmx.console_target import SACN, DmxProtocol
 from lightpaint.errors import ConsoleError
 
 #: How a packet of ACN begins: sizes before and after the packet, and its name.

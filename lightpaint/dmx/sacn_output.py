@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 
 import sacn
 
-from lightpaint.dmx.network.console_target import ConsoleTarget
+from lightpaint.dmx.console_target import ConsoleTarget
 
 #: Packets that end a stream, E1.31 (6.2.6).
 FAREWELLS = 3

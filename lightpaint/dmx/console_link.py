@@ -13,9 +13,9 @@ from importlib.util import find_spec
 from threading import Condition, Thread
 from typing import Protocol, Self
 
+from lightpaint.dmx import console_target
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import DriveFade, RigDrives, check_drives, encode_levels
-from lightpaint.dmx.network import console_target
 from lightpaint.errors import ConsoleError
 
 #: Packets with the same levels before a universe falls silent.
@@ -314,7 +314,7 @@ def _open_output(
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
                 tried.bind((interface, 0))
         if target.protocol is console_target.SACN:
-            from lightpaint.dmx.network.sacn_output import SacnOutput
+            from lightpaint.dmx.sacn_output import SacnOutput
 
             return SacnOutput(
                 *(target, universes),
@@ -322,7 +322,7 @@ def _open_output(
                 priority=priority,
                 interface=interface,
             )
-        from lightpaint.dmx.network.artnet_output import ArtnetOutput
+        from lightpaint.dmx.artnet_output import ArtnetOutput
 
         return ArtnetOutput(target, universes, interface=interface)
     except OSError as error:

@@ -1,1 +1,0 @@
-"""Levels on a network: to a console, and back."""

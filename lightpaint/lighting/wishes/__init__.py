@@ -1,1 +1,0 @@
-"""Wishes for illuminance and power, as requirements of a solve."""
