@@ -9,19 +9,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from lightpaint import colour
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.colour import (
-    FEWEST_POINTS,
-    REC709,
-    Spectrum,
-    rgb_to_xyz,
-    spectrum_of,
-    uv_of_black_body,
-    xy_of,
-    xy_of_spectrum,
-    xyz_of,
-    xyz_of_powers,
-)
 from lightpaint.dmx.gdtf.mode_channels import Curve
 from lightpaint.errors import ColorError
 from lightpaint.storage.rig_archive import library
@@ -72,13 +61,15 @@ USUAL_FILTERS: Mapping[str, RGB] = {
 def rgb_of_xy(xy: Chromaticity) -> Doubles:
     """Return the linear Rec.709 colour of luminance 1, (3,); channels may be negative."""
     x, y = xy
-    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), [x / y, 1.0, (1 - x - y) / y]))
+    return np.asarray(
+        np.linalg.solve(colour.rgb_to_xyz(colour.REC709), [x / y, 1.0, (1 - x - y) / y])
+    )
 
 
 @cache
 def _equal_energy() -> Doubles:
     """Return the colour of equal power at all wavelengths, which filters are measured against."""
-    xy = xy_of_spectrum(np.array([300.0, 900.0]), np.ones(2))
+    xy = colour.xy_of_spectrum(np.array([300.0, 900.0]), np.ones(2))
     assert xy is not None
     return rgb_of_xy(xy)
 
@@ -99,7 +90,7 @@ class EmitterColour:
     candela: float | None = None
     curve: Curve = ()
     is_usual: bool = False
-    spectrum: Spectrum | None = None
+    spectrum: colour.Spectrum | None = None
 
 
 def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -> EmitterColour:
@@ -118,7 +109,7 @@ def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -
     wave = measured.dominant_wave_length
     own = found[0] if found else _spectral(measured.measurements)
     if own is None and wave:
-        own = xy_of_spectrum(np.array([wave]), np.ones(1))
+        own = colour.xy_of_spectrum(np.array([wave]), np.ones(1))
     candela, curve = _measured_light(measured.measurements)
     return EmitterColour(
         " ".join(element.get("Name", "").lower().split()) or name,
@@ -153,24 +144,28 @@ def _spectral(measurements: Sequence[Any]) -> Chromaticity | None:
     for measurement in sorted(measurements, key=lambda x: -float(x.physical)):
         points = _spectrum(measurement)
         if len(points) > 1:
-            return xy_of_spectrum(*points.T)
+            return colour.xy_of_spectrum(*points.T)
     return None
 
 
-def _measured_spectrum(measurements: Sequence[Any], own: Chromaticity | None) -> Spectrum | None:
+def _measured_spectrum(
+    measurements: Sequence[Any], own: Chromaticity | None
+) -> colour.Spectrum | None:
     """Return the spectrum that was measured at the highest level, if it has the emitter's colour.
 
     own: this colour, None if the file has none.
     """
     full = max(measurements, key=lambda x: float(x.physical), default=None)
     points = np.zeros((0, 2)) if full is None else _spectrum(full)
-    if own is None or len(points) < FEWEST_POINTS:
+    if own is None or len(points) < colour.FEWEST_POINTS:
         return None
     try:
-        found = spectrum_of(*points.T)
+        found = colour.spectrum_of(*points.T)
     except ColorError:  # nobody sees it
         return None
-    return found if math.dist(xy_of(xyz_of_powers(found)), own) < SAME_COLOUR else None
+    return (
+        found if math.dist(colour.xy_of(colour.xyz_of_powers(found)), own) < SAME_COLOUR else None
+    )
 
 
 def _spectrum(measurement: Any) -> Doubles:
@@ -204,8 +199,8 @@ def possible_kelvin(kelvin: float) -> float:
 
 def xy_of_kelvin(kelvin: float) -> Chromaticity:
     """Return the chromaticity of a black body."""
-    [uv] = uv_of_black_body(np.array([possible_kelvin(kelvin)]))
-    return xy_of(xyz_of(uv))
+    [uv] = colour.uv_of_black_body(np.array([possible_kelvin(kelvin)]))
+    return colour.xy_of(colour.xyz_of(uv))
 
 
 def whites_of(own: float, ends: tuple[float, float]) -> list[EmitterColour]:
@@ -326,11 +321,11 @@ def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
     for measurement in library("pygdtf").Filter(xml_node=element).measurements:
         spectrum = _spectrum(measurement)
         if len(spectrum) > 1 and measurement.physical > 0 and measurement.transmission > 0:
-            xy = xy_of_spectrum(*spectrum.T)
+            xy = colour.xy_of_spectrum(*spectrum.T)
             if xy is not None:
                 level = _as_share(measurement.transmission)
                 points.append((measurement.physical / 100, level * rgb_of_xy(xy) / _equal_energy()))
-    colour = parsed_colour(element.get("Color"))
-    if not points and colour is not None and colour[1] > 0:
-        points.append((1.0, min(colour[1], 100.0) / 100 * rgb_of_xy(colour[0])))
+    given = parsed_colour(element.get("Color"))
+    if not points and given is not None and given[1] > 0:
+        points.append((1.0, min(given[1], 100.0) / 100 * rgb_of_xy(given[0])))
     return points
