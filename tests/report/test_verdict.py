@@ -24,7 +24,6 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report import verdict_sentences
 from lightpaint.report.verdict_sentences import headline, verdict
 from lightpaint.target.painted_target import Target
 
@@ -233,7 +232,7 @@ def test_a_spot_of_a_close_answer_is_laid_on_no_light_that_samples_do_not_tell(
     basis = make_basis(images=0.5 + noise[0], half_differences=noise[1], names=["lamp", "bulb"])
     solution = solve(basis, Target.of(basis.images[0], name="lamp"), literal=True)
     seen = _seen(2.0, is_spot=True, local_lights=("bulb",))
-    monkeypatch.setattr(verdict_sentences, "compare_appearance", lambda *_: seen)
+    monkeypatch.setattr("lightpaint.lighting.compare_appearance", lambda *_: seen)
     sentence = verdict(solution, combine(basis, solution.lighting), None)
     start = "Close, but the brighter light in the middle is missing: "
     assert sentence.startswith(f"{start}too few samples tell what bulb can do there.")
