@@ -61,6 +61,10 @@ _Result_T = TypeVar("_Result_T")
 #: A shape that is only visible through instances.
 GROUP = "shapegroup"
 
+#: Whether scenes that this process has loaded have null surfaces, by what they are without lights
+#: (`SceneHasher.surroundings`).
+_has_null: dict[str, bool] = {}
+
 
 class SceneFiles:
     """The files of a `Scene`, which has these attributes and describes them."""
@@ -495,18 +499,25 @@ def up_of(parsed: ParsedScene, sensor: int, emitters: Sequence[Emitter]) -> Posi
 
 
 def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
-    """Return the fields of a `Scene` that require loading it."""
-    loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
+    """Return the fields of a `Scene` that require loading it.
+
+    Of a scene that was loaded before with other lights, as a relit scene is, only lights and
+    sensors are loaded: shapes and materials take most of the time.
+    """
+    has_null = _has_null.get(surroundings := SceneHasher.surroundings(parsed))
+    loaded = (parsed if has_null is None else parsed.lights_alone()).instantiate({})
+    hasher = SceneHasher(parsed)
     camera = camera_named(loaded, parsed.sensor_names[sensor])
     emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)
     facts = {
         "emitters": emitters,
         "film": film,
         "spp": int(camera.sampler().sample_count()),
-        "has_null": (has_null := _has_null_surfaces(loaded)),
+        "has_null": (has_null := _has_null_surfaces(loaded) if has_null is None else has_null),
     }
     del loaded, camera
     gc.collect()
+    _has_null[surroundings] = has_null
     has_environment = any(emitter.plugin in ENVIRONMENTS for emitter in emitters)
     return {
         **facts,

@@ -9,6 +9,7 @@ light of all others, so it belongs to the scene, including its position.
 
 import hashlib
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,17 +60,30 @@ class SceneHasher:
         """
         import mitsuba as mi
 
-        parsed, kinds = self._parsed, mi.ObjectType
-        other_sensors = {*parsed.sensor_nodes} - {parsed.sensor_nodes[film.sensor]}
-        children = [
-            self._hash(k)
-            for k in parsed.children_of(0)
-            if self._nodes[k].type != kinds.Emitter and k not in other_sensors
-        ]
-        passes = has_null or parsed.has_media()
+        other_sensors = {*self._parsed.sensor_nodes} - {self._parsed.sensor_nodes[film.sensor]}
+        passes = has_null or self._parsed.has_media()
         # The index of the sensor counts, since views have independent random numbers.
-        facts = (mi.__version__, film.sensor, has_environment and passes, children)
-        return _digest(facts)
+        children = self._unlit_children(other_sensors)
+        return _digest((mi.__version__, film.sensor, has_environment and passes, children))
+
+    @classmethod
+    def surroundings(cls, parsed: ParsedScene) -> str:
+        """Return a hash of all of a scene but its lights, with every sensor.
+
+        parsed: not loaded yet. Mitsuba still finds the parameters in it that nothing reads.
+        """
+        return _digest(cls(parsed.copied())._unlit_children(()))
+
+    def _unlit_children(self, left_out: Container[int]) -> list[str]:
+        """Return hashes of what the scene consists of besides lights. left_out: nodes."""
+        import mitsuba as mi
+
+        emitter = mi.ObjectType.Emitter
+        return [
+            self._hash(k)
+            for k in self._parsed.children_of(0)
+            if self._nodes[k].type != emitter and k not in left_out
+        ]
 
     def emitter(self, node: int, kind: EmissionKind | None) -> EmitterDigest:
         """Return the hashes of the emitter at `node`. kind: how it is scaled."""

@@ -215,6 +215,32 @@ class ParsedScene:
             make_normals_reproducible(scene)
         return scene
 
+    def copied(self) -> "ParsedScene":
+        """Return a copy with nodes of its own: a property that is read counts as used by Mitsuba,
+        which refuses unused ones.
+        """
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        return other
+
+    def lights_alone(self) -> "ParsedScene":
+        """Return a copy that loads only sensors, emitters and the shapes that hold one of them."""
+        import mitsuba as mi
+
+        copied, kinds = self.copied(), mi.ObjectType
+        holders = {*self.shape_of.values(), *self._shapes_by_child(kinds.Sensor).values()}
+        while outer := {self.parent_of[k] for k in holders if k in self.parent_of} - holders:
+            holders |= outer
+        kept = {kinds.Sensor, kinds.Emitter, kinds.Integrator}
+        root, reference = copied.state.nodes[0].props, mi.Properties.Type.ResolvedReference
+        for key in [key for key in root if root.type(key) == reference]:
+            child = root[key].index()
+            if child not in holders and self.state.nodes[child].type not in kept:
+                del root[key]
+        return copied
+
     def _config(self) -> Any:
         """Return the configuration for the variant that is in use, which may be a spectral one."""
         import mitsuba as mi
@@ -398,10 +424,8 @@ def make_normals_reproducible(scene: Any) -> None:
 
 def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedScene:
     """Return a copy of a scene with moved emitters. motions: by emitter node."""
-    import mitsuba as mi
 
-    copied = copy(parsed)
-    copied.state = mi.parser.ParserState(parsed.state)
+    copied = parsed.copied()
     copied.moved = dict(parsed.moved)
     for emitter, motion in motions.items():
         node = parsed.shape_of.get(emitter, emitter)
@@ -415,10 +439,8 @@ def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedSc
 
 def with_settings(parsed: ParsedScene, settings: Mapping[int, EmitterSetting]) -> ParsedScene:
     """Return a copy of a scene in which emitters have other settings, by emitter node."""
-    import mitsuba as mi
 
-    copied = copy(parsed)
-    copied.state = mi.parser.ParserState(parsed.state)
+    copied = parsed.copied()
     for node, setting in settings.items():
         set_emission(copied.state, node, setting, on_shape=node in parsed.shape_of)
     return copied
@@ -426,10 +448,8 @@ def with_settings(parsed: ParsedScene, settings: Mapping[int, EmitterSetting]) -
 
 def with_sampling(parsed: ParsedScene, weights: Mapping[int, float]) -> ParsedScene:
     """Return a copy of a scene with other sampling weights. weights: by emitter node."""
-    import mitsuba as mi
 
-    copied = copy(parsed)
-    copied.state = mi.parser.ParserState(parsed.state)
+    copied = parsed.copied()
     for node, weight in weights.items():
         copied.state.nodes[node].props["sampling_weight"] = weight
     return copied
@@ -439,8 +459,7 @@ def without_emitters(parsed: ParsedScene, emitters: Collection[int]) -> ParsedSc
     """Return a copy of a scene without the emitters of these nodes, and the shapes of theirs."""
     import mitsuba as mi
 
-    copied = copy(parsed)
-    copied.state = mi.parser.ParserState(parsed.state)
+    copied = parsed.copied()
     copied.emitter_nodes = [node for node in parsed.emitter_nodes if node not in emitters]
     left_out = {*emitters, *(parsed.shape_of[node] for node in emitters if node in parsed.shape_of)}
     reference = mi.Properties.Type.ResolvedReference
@@ -458,8 +477,7 @@ def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedSce
     """
     import mitsuba as mi
 
-    copied = copy(parsed)
-    copied.state = mi.parser.ParserState(parsed.state)
+    copied = parsed.copied()
     copied.emitter_nodes, copied.names = [*parsed.emitter_nodes], dict(parsed.names)
     copied.shape_of = dict(parsed.shape_of)
     node_of = {name: node for node, name in parsed.names.items()}
