@@ -24,6 +24,10 @@ _lock = Lock()
 _memos: dict[int, dict[Hashable, Future[Any]]] = {}
 
 
+#: The key of the content of the file that has the planes.
+_FILE_CONTENT = "content of the file"
+
+
 @dataclass(frozen=True)
 class _ArrayKey:
     """The key of an array that may be kept in a file."""
@@ -84,6 +88,18 @@ def set_known_arrays(planes: Planes, arrays: Mapping[str, npt.NDArray[Any]]) -> 
         for name, array in arrays.items():
             known = memo[_ArrayKey(name)] = Future()
             known.set_result(array)
+
+
+def set_file_content(planes: Planes, content: str) -> None:
+    """Note that planes are exactly those of a file. content: another text for another file."""
+    make_once(planes, _FILE_CONTENT, lambda: content)
+
+
+def file_content(planes: Planes) -> str | None:
+    """Return what `set_file_content` noted; None for planes that are of no file, or changed."""
+    with _lock:
+        noted = _memo_of(planes).get(_FILE_CONTENT)
+    return None if noted is None else str(noted.result())
 
 
 def forget_results(planes: Planes) -> None:

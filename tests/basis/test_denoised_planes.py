@@ -17,7 +17,8 @@ from lightpaint.basis.cache.denoised_planes import (
     scale_of,
 )
 from lightpaint.basis.denoised_mixes import denoise_current_look
-from lightpaint.images.denoiser import denoised, oidn_is_installed
+from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.images.denoiser import Features, denoised, oidn_is_installed
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_mean
 
@@ -65,6 +66,35 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
     assert read_denoised_planes(replace(basis, lights=brighter)) is None
     assert read_denoised_planes(basis) is not None
+
+
+def test_planes_of_a_file_are_known_without_reading_them(
+    make_basis: Any, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+):
+    path = tmp_path_factory.mktemp("saved") / "a.basis.exr"
+    write_basis(path, make_basis(2, (24, 32)))
+    basis = read_basis(path)
+    first = obtain_denoised_planes(basis)
+    hashed: list[Any] = []
+    keys = denoised_planes._content_keys
+    monkeypatch.setattr(
+        denoised_planes, "_content_keys", lambda basis: hashed.append(basis) or keys(basis)
+    )
+    again = read_denoised_planes(read_basis(path))
+    assert not hashed
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(again.halves, first.halves)
+    # Other current emissions, other features and other noise are seen; so are changed planes.
+    brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
+    assert read_denoised_planes(replace(basis, lights=brighter)) is None
+    grey = np.full((24, 32, 3), 0.5, np.float32)
+    features = Features(grey, grey)
+    assert read_denoised_planes(replace(basis, features=features)) is None
+    assert read_denoised_planes(replace(basis, noise=1 + basis.half_differences)) is None
+    basis.planes.plane(0)[...] *= 2
+    assert read_denoised_planes(basis.without_cached_values()) is None
+    assert len(hashed) == 4
 
 
 @pytest.mark.parametrize("factor", [1, 2])

@@ -7,7 +7,7 @@ from typing import Any
 
 from lightpaint.arrays import Indices
 from lightpaint.basis.cache import basis_cache, plane_reuse
-from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
+from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect, note_file
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import rendered_basis
 from lightpaint.basis.render.basis_render import render_basis
@@ -149,8 +149,11 @@ def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) ->
     if not is_large(len(basis.lights), basis.size):
         # The next run, which reads the file, must find the same planes.
         basis = replace(as_stored(basis, keep), sums=None)
-        file = basis_cache.file_of(basis)
-        return basis if file is None else leave_indirect(basis, file)
+        if (file := basis_cache.file_of(basis)) is None:
+            return basis
+        basis = leave_indirect(basis, file)
+        note_file(basis, file)
+        return basis
     if keep(basis):
         of_file = basis_cache.find(
             scene.identity, basis.origin.sensor, basis.origin.seed, basis.size

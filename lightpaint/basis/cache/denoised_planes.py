@@ -9,6 +9,7 @@ time.
 
 import hashlib
 import zipfile
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +21,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
+from lightpaint.basis.file.file_parts import plane_sets
 from lightpaint.basis.light_basis import Basis
+from lightpaint.basis.plane_results import file_content
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -185,9 +188,9 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    keys = _content_keys(basis)
-    planes = _read(basis, keys, factor)
+    planes = _read(basis, factor)
     if planes is None:
+        keys = _content_keys(basis)
         shared = _read_shared(basis, keys, factor)
         pairs = [
             shared[k] if k in shared else denoise_to_halves(basis, k, factor)
@@ -219,16 +222,16 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
     with suppress(OSError, LightpaintError):
         if not basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX).exists():
             return None  # before all planes are read for their keys
-    return _read(basis, _content_keys(basis), factor)
+    return _read(basis, factor)
 
 
-def _read(basis: Basis, keys: list[str], factor: int) -> DenoisedPlanes | None:
+def _read(basis: Basis, factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
         path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
         if not basis_cache.is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
-            if file_arrays["made_of"].tolist() != keys:
+            if not _is_made_of(file_arrays, basis):
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
         arrays: list[Any] = [planes.halves, planes.scales, planes.current]
@@ -241,6 +244,16 @@ def _read(basis: Basis, keys: list[str], factor: int) -> DenoisedPlanes | None:
             path.touch()
             return planes
     return None
+
+
+def _is_made_of(file_arrays: Mapping[str, npt.NDArray[Any]], basis: Basis) -> bool:
+    """Return whether denoised planes were made of exactly this basis, which the content of its file
+    tells at once; without a file, all planes are read for their keys.
+    """
+    key = _file_key(basis)
+    if key and "of_file" in file_arrays and str(file_arrays["of_file"]) == key:
+        return True
+    return bool(file_arrays["made_of"].tolist() == _content_keys(basis))
 
 
 def _read_shared(basis: Basis, keys: list[str], factor: int) -> dict[int, tuple[Halves, float]]:
@@ -273,10 +286,10 @@ def _write(basis: Basis, keys: list[str], planes: DenoisedPlanes) -> bool:
     try:
         path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
-            made_of = np.array(keys)
+            made_of, of_file = np.array(keys), np.array(_file_key(basis))
             arrays = (planes.halves, planes.scales, planes.current)
             parts: dict[str, Any] = dict(zip(ARRAY_NAMES, arrays, strict=True))
-            np.savez(file, made_of=made_of, **parts)
+            np.savez(file, made_of=made_of, of_file=of_file, **parts)
     except (OSError, LightpaintError):
         return False
     return True
@@ -299,21 +312,39 @@ def _content_keys(basis: Basis) -> list[str]:
     """Return hashes of all that the denoised planes depend on: one for each light, and one for all
     of them in the current scene.
     """
-    features, parts = basis.features, basis.indirect
-    stacks = [basis.planes, basis.noise]
-    if parts is not None:
-        stacks += [parts.planes, parts.noise]
-    parameters = repr(
-        (FORMAT, denoiser_text(features, raw=""), basis.size, len(stacks), basis.knows_noise)
-    )
-    inputs = [] if features is None else [features.albedo, features.normal]
-    shared = _digest(*inputs, start=parameters)
+    shared, stacks = _shared_key(basis), plane_sets(basis)
     keys = parallel_map(
         lambda k: _digest(*(planes.plane(k) for planes in stacks), start=shared),
         range(len(basis.lights)),
         unit="lights",
     )
     return [*keys, _digest(basis.current_weights, start=" ".join(keys))]
+
+
+def _file_key(basis: Basis) -> str:
+    """Return a hash of the same by the content of the file that has all planes; "" if there is
+    none.
+    """
+    contents = {file_content(planes) for planes in plane_sets(basis)}
+    if len(contents) > 1 or None in contents:
+        return ""
+    return _digest(basis.current_weights, start=f"{_shared_key(basis)} {contents.pop()}")
+
+
+def _shared_key(basis: Basis) -> str:
+    """Return a hash of what the denoised planes of all lights depend on."""
+    features = basis.features
+    parameters = repr(
+        (
+            FORMAT,
+            denoiser_text(features, raw=""),
+            basis.size,
+            len(plane_sets(basis)),
+            basis.knows_noise,
+        )
+    )
+    inputs = [] if features is None else [features.albedo, features.normal]
+    return _digest(*inputs, start=parameters)
 
 
 def _digest(*arrays: npt.NDArray[Any], start: str) -> str:

@@ -6,6 +6,7 @@ file is read completely into memory or, if it is large, row by row on request.
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -46,6 +47,7 @@ from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane,
 from lightpaint.basis.file.noise_rounding import MANY_LIGHTS
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.plane_results import set_file_content
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError
 from lightpaint.files import file_length, one_line
@@ -288,6 +290,7 @@ def read_basis(path: str | Path) -> Basis:
         parts = _read_by_lights(path) or read_parts(path)
         head = _head(p.attributes for p in parts)
         basis = replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
+        _note_content(basis, head)
         del parts
         if path.stat().st_size > QUICK_MAX_BYTES:
             release_freed_memory()
@@ -378,6 +381,21 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
             "make one with lightpaint basis"
         )
     return head
+
+
+def _note_content(basis: Basis, head: Mapping[str, str]) -> None:
+    """Note of the planes of a basis that they are those of the file with this head, if that has
+    checksums.
+    """
+    if CHECKSUMS_KEY in head:
+        for planes in plane_sets(basis):
+            set_file_content(planes, f"{head[CHECKSUMS_KEY]} {head[ORIGIN_KEY]}")
+
+
+def note_file(basis: Basis, path: Path) -> None:
+    """Note of the planes of a basis that they are those of a file, as of one from `read_basis`."""
+    with suppress(LightpaintError, OSError, *_HEADER_ERRORS):
+        _note_content(basis, _head(read_headers(path)[0]))
 
 
 def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
