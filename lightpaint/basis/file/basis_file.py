@@ -413,7 +413,10 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
         of_lights = [stored(k)[number] for k in order]
         is_direct = number < 2
         if not _is_encoded(len(order), size):
-            return as_planes(np.stack([as_encoded_plane(x, size).decoded() for x in of_lights]))
+            singles = np.empty((len(order), *size, 3), np.float32)
+            for k, stored_plane in enumerate(of_lights):
+                singles[k] = as_encoded_plane(stored_plane, size).decoded()
+            return as_planes(singles)
         if len(order) >= MIN_LIGHTS and is_direct:
             return LitPlanes([as_lit_plane(x) for x in of_lights], size)
         whole = [as_encoded_plane(x, size) for x in of_lights]
