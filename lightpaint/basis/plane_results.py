@@ -91,7 +91,7 @@ def set_known_arrays(planes: Planes, arrays: Mapping[str, npt.NDArray[Any]]) -> 
 
 
 def set_file_content(planes: Planes, content: str) -> None:
-    """Note that planes are exactly those of a file. content: another text for another file."""
+    """Note that a file has exactly these planes. content: another text for another file."""
     make_once(planes, _FILE_CONTENT, lambda: content)
 
 

@@ -384,16 +384,14 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
 
 
 def _note_content(basis: Basis, head: Mapping[str, str]) -> None:
-    """Note of the planes of a basis that they are those of the file with this head, if that has
-    checksums.
-    """
+    """Note that the file with this head, if it has checksums, has the planes of a basis."""
     if CHECKSUMS_KEY in head:
         for planes in plane_sets(basis):
             set_file_content(planes, f"{head[CHECKSUMS_KEY]} {head[ORIGIN_KEY]}")
 
 
 def note_file(basis: Basis, path: Path) -> None:
-    """Note of the planes of a basis that they are those of a file, as of one from `read_basis`."""
+    """Note that a file has the planes of a basis, so that `read_basis` returns the same."""
     with suppress(LightpaintError, OSError, *_HEADER_ERRORS):
         _note_content(basis, _head(read_headers(path)[0]))
 
