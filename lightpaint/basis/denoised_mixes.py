@@ -8,12 +8,13 @@ installed, both are.
 """
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, largest
 from lightpaint.basis.light_basis import Basis
 from lightpaint.images import Quality, block_mean, box_mean, denoised, oidn_is_installed, shifted
 
@@ -105,7 +106,9 @@ def _denoise_pictures(
     def without_grain(part: Floats, *, is_direct: bool) -> Floats:
         if along_surfaces is not None:
             is_averaged = factor > 1 or (quality == "fast" and along_surfaces.is_quick)
-            if (is_direct and is_averaged) or not oidn_is_installed():
+            if is_direct and is_averaged:
+                return _within_neighbours(along_surfaces(part), part)
+            if not oidn_is_installed():
                 return along_surfaces(part)
         return denoised(part, features, quality=quality)
 
@@ -117,6 +120,14 @@ def _denoise_pictures(
     if not basis.knows_noise:
         return smooth + blend_by_grain(direct, clean)
     return smooth + blend_by_noise(direct, noise - indirect_noise, clean)
+
+
+def _within_neighbours(clean: Floats, raw: Floats) -> Floats:
+    """Return a filtered picture within the range of the raw one in the pixels around, (h, w, 3).
+
+    The filter would spread highlights and reflections of lamps, whose edges no surface has.
+    """
+    return np.clip(clean, -_window_maximum(-raw, 1), _window_maximum(raw, 1))
 
 
 def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
@@ -162,23 +173,32 @@ def stray_pixels(raw: Floats, half_difference: Floats, clean: Floats) -> npt.NDA
     neighbours but one, which excludes lines. And in two of the four windows around it the halves of
     a pixel differ by about its excess, so single samples do have such values.
     """
-    brightness, expected = raw.max(axis=-1), clean.max(axis=-1)
-    neighbours = np.stack([shifted(brightness, *offset) for offset in _NEIGHBOURS])
-    second = np.partition(neighbours, -2, axis=0)[-2]
+    brightness, expected = largest(raw), largest(clean)
+    second = _second_largest([shifted(brightness, *offset) for offset in _NEIGHBOURS])
     is_outstanding = brightness > OUTSTANDING * np.maximum(second, expected)
-    largest = _window_maximum(2 * np.abs(half_difference).max(axis=-1))
+    most = _window_maximum(2 * largest(np.abs(half_difference)), WINDOW_RADIUS)
     corners = product((-WINDOW_DISTANCE, WINDOW_DISTANCE), repeat=2)
-    windows = np.stack([shifted(largest, *corner) for corner in corners])
-    by_chance = LARGEST_CHANCE * np.partition(windows, -2, axis=0)[-2]
+    by_chance = LARGEST_CHANCE * _second_largest([shifted(most, *corner) for corner in corners])
     is_stray = is_outstanding & (brightness - expected <= by_chance)
     return np.asarray(is_stray, np.bool_)
 
 
-def _window_maximum(values: Floats) -> Floats:
-    """Return the largest value of the window around each pixel, (h, w)."""
-    steps = range(-WINDOW_RADIUS, WINDOW_RADIUS + 1)
-    along_rows = np.max([shifted(values, 0, step) for step in steps], axis=0)
-    return np.asarray(np.max([shifted(along_rows, step, 0) for step in steps], axis=0), np.float32)
+def _second_largest(pictures: Sequence[Floats]) -> Floats:
+    """Return the second largest value of each pixel."""
+    most, second = pictures[0], np.full_like(pictures[0], -np.inf)
+    for picture in pictures[1:]:
+        np.maximum(second, np.minimum(most, picture), out=second)
+        most = np.maximum(most, picture)
+    return second
+
+
+def _window_maximum(values: Floats, radius: int) -> Floats:
+    """Return the largest value of the window around each pixel, of the shape of `values`."""
+    for axis in (1, 0):
+        steps = (step for step in range(-radius, radius + 1) if step)
+        offsets = [(0, step) if axis else (step, 0) for step in steps]
+        values = reduce(np.maximum, (shifted(values, *offset) for offset in offsets), values)
+    return values
 
 
 def blend_by_grain(raw: Floats, clean: Floats) -> Floats:

@@ -94,9 +94,10 @@ def box_mean(values: Floats, radius: int) -> Floats:
 def shifted(values: Floats, dy: int, dx: int) -> Floats:
     """Return each pixel's neighbour at this offset; border pixels are repeated outwards."""
     height, width = values.shape[:2]
-    y = np.clip(np.arange(height) + dy, 0, height - 1)
-    x = np.clip(np.arange(width) + dx, 0, width - 1)
-    return values[y[:, None], x]
+    before, after = (max(-dy, 0), max(-dx, 0)), (max(dy, 0), max(dx, 0))
+    margins = [*zip(before, after, strict=True), *[(0, 0)] * (values.ndim - 2)]
+    wider = np.pad(values, margins, mode="edge")
+    return np.asarray(wider[after[0] : after[0] + height, after[1] : after[1] + width])
 
 
 def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:

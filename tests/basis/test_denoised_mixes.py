@@ -183,6 +183,33 @@ def test_direct_light_is_averaged_along_surfaces(
     assert beside.max() < 4 * 0.02 / np.sqrt(2 * factor**2)
 
 
+@pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
+def test_the_filter_does_not_spread_what_no_surface_shows(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    """A lamp in a mirror, whose border few samples show: dark pixels beside it stay dark."""
+    smooth = np.full((*SIZE, 3), 0.3, np.float32)
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    distance = np.hypot(y - 24, x - 32)[..., None] * np.ones(3)
+    lamp = np.where(distance < 6, 20, 0.01).astype(np.float32)
+    border = np.where(np.abs(distance - 6) < 1, rng.choice([-10, 10], distance.shape), 0)
+    plain = split_basis(lamp, smooth, rng)
+    parts = plain.indirect
+    assert parts is not None
+    noise = as_planes(parts.noise.array() + border.astype(np.float32))
+    basis = replace(plain, features=wall(), noise=noise)
+    seen = []
+    monkeypatch.setattr(
+        "lightpaint.basis.denoised_mixes.denoised",
+        lambda image, *_, **__: (seen.append(image), np.zeros_like(image))[1],
+    )
+    clean = denoise_mix(basis, np.ones((1, 3)))
+    assert len(seen) == 1  # indirect light alone
+    outside = np.abs(clean - lamp)[distance > 7.5]
+    assert outside.max() < 1e-3
+    assert np.abs(basis.surfaces(1)[1](lamp) - lamp)[distance > 7.5].max() > 0.5  # type: ignore[misc]
+
+
 def two_lights(rng: np.random.Generator) -> tuple[Basis, list[np.ndarray]]:
     """A basis of two lights whose pools are where the other's are not, and its true planes."""
     pools, glow = pools_and_glow()
