@@ -89,6 +89,10 @@ class Planes(Protocol):
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3), indexed in row-major order."""
 
+    @property
+    def strip_pixels(self) -> int:
+        """Number of consecutive pixels that are best looked for together, by `lit_entries`."""
+
     def lit_entries(self, where: slice | Indices) -> LitEntries | None:
         """Return the lit ones of some pixels of all planes; None if the planes do not know them."""
 
@@ -161,6 +165,11 @@ class PlanesBase:
         """Return some pixels of all planes, (n, p, 3)."""
         raise NotImplementedError
 
+    @property
+    def strip_pixels(self) -> int:
+        """Number of consecutive pixels that are best looked for together, by `lit_entries`."""
+        return 1
+
     def lit_entries(self, where: slice | Indices) -> LitEntries | None:
         """Return the lit ones of some pixels of all planes; None if the planes do not know them."""
         return None
@@ -228,10 +237,12 @@ class PlanesBase:
         step, kind = block_of(self)
         # Pixels without weight in between cost less than gathering the others.
         spare = 0 if n <= FEW_LIGHTS else step // 8
-        rooms = Rooms(n, (n + 1) * (min(step, counted.size) + spare), kind)
+        blocks = blocks_of(self, counted)
+        length = max((block.size for block in blocks), default=0)
+        rooms = Rooms(n, (n + 1) * (length + spare), kind)
         with one_thread():
-            for start in with_progress(range(0, counted.size, step)):
-                where = as_slice(counted[start : start + step], spare=spare)
+            for block in with_progress(blocks):
+                where = as_slice(block, spare=spare)
                 light = _LightOf(self, where)
                 _add_products(gram, light, *squares(where, light.dense), rooms)
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
@@ -423,6 +434,24 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64
     return BLOCK_PIXELS // (2 if planes.count < LARGE_BLOCK_LIGHTS else 4), np.float32
+
+
+def blocks_of(planes: "Planes | PlanesBase", counted: Indices) -> list[Indices]:
+    """Return the blocks of some pixels, in order, whose light is multiplied at a time.
+
+    Of planes in strips, a block has whole strips: looking for a part of one takes as long.
+    """
+    step, _ = block_of(planes)
+    strip = planes.strip_pixels
+    if strip == 1:
+        return [counted[start : start + step] for start in range(0, counted.size, step)]
+    length = strip * max(1, round(step / strip))
+    ends = np.searchsorted(counted, range(strip, planes.size[0] * planes.size[1], strip)).tolist()
+    edges = [0]
+    for end, following in pairwise([*ends, counted.size]):
+        if following - edges[-1] > length:
+            edges.append(end)
+    return [block for block in np.split(counted, edges[1:]) if block.size]
 
 
 def as_slice(pixels: Indices, *, spare: int = 0) -> slice | Indices:

@@ -80,6 +80,11 @@ class DeferredPlanes(RowPlanes):
         """Return some pixels of all planes, (n, p, 3)."""
         return self.whole.pixels(where)
 
+    @property
+    def strip_pixels(self) -> int:
+        """Number of consecutive pixels that are best looked for together, by `lit_entries`."""
+        return self.whole.strip_pixels
+
     def lit_entries(self, where: slice | Indices) -> LitEntries | None:
         """Return the lit ones of some pixels of all planes; None if the planes do not know them."""
         return self.whole.lit_entries(where)

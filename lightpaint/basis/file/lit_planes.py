@@ -290,6 +290,11 @@ class LitPlanes(RowPlanes):
         lit = pixels * len(self._clean) + sum(strip.lit.size for strip in self._lit)
         return lit <= MAX_LIT_SHARE * self._count * pixels
 
+    @property
+    def strip_pixels(self) -> int:
+        """Number of pixels of a strip, or 1 if `lit_entries` has none of them."""
+        return self.strip_rows * self._size[1] if self._is_mostly_black else 1
+
     def lit_entries(self, where: slice | Indices) -> LitEntries | None:
         """Return the lit ones of some pixels, in row-major order, of all planes; None if many
         are.

@@ -10,10 +10,8 @@ import pytest
 import scipy
 from nightly import nightly
 
-from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise import uncertainty
@@ -21,8 +19,6 @@ from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix, pseu
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
-    _least_power,
-    _power_error,
     error_bars,
     weakest_matrix,
     with_error_bars,
@@ -624,42 +620,31 @@ def test_a_limit_that_is_met_leaves_one_side(make_basis: Any):
         assert (ends[0] < ends[1]).all()
 
 
-def lit_planes_of(images: Any) -> LitPlanes:
-    channels = np.moveaxis(images, -1, 1)
-    return LitPlanes([LitPlane.of(list(x), 1.0) for x in channels], images.shape[1:3])
-
-
 @pytest.mark.parametrize("together", [1, 5, 32])
-@pytest.mark.parametrize("kind", [MemoryPlanes, lit_planes_of])
 def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light(
-    kind: Any, together: int, monkeypatch: pytest.MonkeyPatch
+    together: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the pseudo-inverse anew after each light; to round-off of the inverses."""
     monkeypatch.setattr(uncertainty, "COLUMNS_AT_A_TIME", together)
     rng = np.random.default_rng(1)
-    n, size = 12, (6, 8)
-    image = rng.gamma(0.3, 1, (n, *size, 3)).astype(np.float32)
-    half = (image * rng.normal(size=image.shape)).astype(np.float32)
-    importance = rng.uniform(0.2, 1, (*size, 1)).astype(np.float32)
-    M = np.einsum("nhwc,mhwc,hwd->cnm", image, image, importance, dtype=np.float64)
-    own = np.einsum("nhwc,nhwc,hwd->cn", half, half, importance, dtype=np.float64)
-    power = own[:, :, None] * np.eye(n)
-    corrected = denoised_matrix(NormalEquations(M, np.zeros((3, n)), np.zeros(3)), power)
-    doubts = np.clip(rng.uniform(-0.5, 1.3, (n, 3)), 0, 1)
-    solution = SimpleNamespace(
-        basis=SimpleNamespace(planes=kind(image), noise=kind(half)),
-        equations=SimpleNamespace(M=M),
-        problem=SimpleNamespace(squares=SimpleNamespace(weight=importance)),
+    image = rng.gamma(0.3, 1, (3, 12, 48))
+    M = image @ image.mT
+    power = np.square(image * rng.normal(size=image.shape)).sum(axis=2)[..., None] * np.eye(12)
+    noise = SimpleNamespace(
+        power=power,
+        power_error=rng.uniform(0, 0.3, (3, 12)) * np.einsum("cii->ci", power),
+        least_power=rng.uniform(0, 0.3, (3, 12)) * np.einsum("cii->ci", M),
     )
-    weakest = weakest_matrix(solution, power, doubts, corrected)  # type: ignore[arg-type]
+    corrected = denoised_matrix(NormalEquations(M, np.zeros((3, 12)), np.zeros(3)), power)
+    doubts = np.clip(rng.uniform(-0.5, 1.3, (12, 3)), 0, 1)
+    weakest = weakest_matrix(M, noise, doubts, corrected)  # type: ignore[arg-type]
     expected = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
-        D = importance.ravel()
-        smooth = _least_power(D, image[k, ..., c].ravel(), float(D.sum()))
-        error = _power_error(D, half[k, ..., c].ravel())
         noisy, alone = (1 / pseudo_inverse(x[c])[k, k] for x in (M, expected))
         least = max(
-            noisy - power[c, k, k] - error, alone - expected[c, k, k] + smooth, 1e-3 * M[c, k, k]
+            noisy - power[c, k, k] - noise.power_error[c, k],
+            alone - expected[c, k, k] + noise.least_power[c, k],
+            1e-3 * M[c, k, k],
         )
         expected[c, k, k] -= doubts[k, c] * max(alone - least, 0)
     assert np.abs(expected - corrected).max() > 0.1

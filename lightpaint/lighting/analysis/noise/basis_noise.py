@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, Rooms, as_slice, block_of
+from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, Rooms, as_slice, blocks_of
 from lightpaint.lighting.algebra.symmetric_matrices import (
     SMALL_MATRIX,
     eigenvectors,
@@ -85,6 +85,8 @@ class Noise:
     doubt: (3, n), an estimate of the error that may be left in target_noise.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
+    power_error, least_power: (3, n), standard errors of Σ D h², and the least ‖Φ‖² without noise
+    that the light of each alone allows.
     hidden: (3, n), variance of a light that a few pixels may hide (dominant_pixels.py).
     freedom: (3, n), degrees of freedom of the variance of a light's gradient: the number of pixels
     of equal noise that would determine it as well.
@@ -96,6 +98,8 @@ class Noise:
     gradient: Doubles
     objective_error: Doubles
     objective_noise: Doubles
+    power_error: Doubles
+    least_power: Doubles
     hidden: Doubles
     freedom: Doubles
 
@@ -140,19 +144,19 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
         # The same parts on every machine, added in order, give the same bits.
         length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
         parts = [counted[k : k + length] for k in range(0, counted.size, length)]
-        step, _ = block_of(pixels.planes)
-        blocks = sum(-(-part.size // step) for part in parts)
+        blocks = sum(len(blocks_of(pixels.planes, part)) for part in parts)
         with counting(blocks, "blocks") as advance:
             for of_part in parallel_map(
                 lambda x: pixels.sums(x, is_coupled=is_coupled, advance=advance), parts
             ):
                 sums.add(of_part)
-    error, noise = np.zeros((2, 3))
+    error, noise, total = np.zeros((3, 3))
     for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
         mixed = residuals.noise(part)
         error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
         noise += (weight[part] * np.square(mixed)).sum(axis=0)
+        total += weight[part].sum(axis=0, dtype=np.float64)
     second = np.einsum("cici->ci", sums.gradient)
     return Noise(
         power=sums.power,
@@ -161,6 +165,8 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
         gradient=sums.gradient,
         objective_error=2 * np.sqrt(error),
         objective_noise=noise,
+        power_error=sums.power_error,
+        least_power=sums.least_power(total),
         hidden=np.array([peaks.hidden() for peaks in sums.peaks]),
         freedom=np.square(second) / np.where(sums.fourth > 0, sums.fourth, np.nan),
     )
@@ -245,12 +251,12 @@ class NoisyPixels:
         advance: Callable[[], None] = lambda: None,
     ) -> None:
         """Add some pixels to sums. advance: see `sums`."""
-        n, (step, _) = len(self.weights), block_of(self.planes)
-        rooms = Rooms(n, n * min(step, counted.size), self._kind, are_kept=is_coupled)
+        n, blocks = len(self.weights), blocks_of(self.planes, counted)
+        length = max((block.size for block in blocks), default=0)
+        rooms = Rooms(n, n * length, self._kind, are_kept=is_coupled)
         with one_thread():
-            for start in with_progress(range(0, counted.size, step)):
-                pixels = as_slice(counted[start : start + step])
-                self._add_block(pixels, sums, rooms, is_coupled=is_coupled)
+            for block in with_progress(blocks):
+                self._add_block(as_slice(block), sums, rooms, is_coupled=is_coupled)
                 advance()
 
     def _add_block(

@@ -5,7 +5,7 @@ half difference is, nothing is added.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis import LitEntries
-from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, Peaks
 
 #: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
 #: or a highlight that both halves have met.
@@ -29,6 +29,9 @@ CACHED_NUMBERS = 2**16
 #: Fewest lights of which pixels are added before they are multiplied, and the number of pixels of
 #: a sum. On 640x360 pixels, standard errors of weights are off by .5 % so, in the root mean square.
 MANY_LIGHTS, FOLDED_PIXELS = 128, 8
+
+#: Number of paths below which the least sum is the same share of the measured one.
+MIN_PATHS = 0.1
 
 #: Seed of the signs with which they are added.
 FOLD_SEED = 5
@@ -99,14 +102,18 @@ def _signs(count: int) -> npt.NDArray[np.int8]:
 class NoiseSums:
     """Sums over some pixels, as in `Noise`.
 
-    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: the
-    pixels that decide, of each channel.
+    light, light_squares, power_squares: (3, n), Σ D Φ, Σ (D Φ)² and Σ (D h²)². fourth: (3, n),
+    fourth powers of the half differences of the gradient. peaks: the pixels that decide, of each
+    channel.
     """
 
     power: Doubles
     target_noise: Doubles
     doubt: Doubles
     gradient: Doubles
+    light: Doubles
+    light_squares: Doubles
+    power_squares: Doubles
     fourth: Doubles
     peaks: tuple[Peaks, ...]
 
@@ -114,17 +121,43 @@ class NoiseSums:
     def zeros(cls, n: int) -> "NoiseSums":
         """Return sums over no pixels."""
         peaks = tuple(Peaks.empty(n) for _ in range(3))
-        gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
-        power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
-        return cls(power, target_noise, doubt, gradient, fourth, peaks)
+        power, gradient = np.zeros((3, n, n)), np.zeros((3, n, 3, n))
+        target_noise, doubt, *of_lights = np.zeros((6, 3, n))
+        return cls(power, target_noise, doubt, gradient, *of_lights, peaks)
 
     def add(self, part: "NoiseSums") -> None:
         """Add the sums over other pixels."""
-        for name in ("power", "target_noise", "doubt", "gradient", "fourth"):
-            total = getattr(self, name)
-            total += getattr(part, name)
+        for field in fields(self)[:-1]:
+            total = getattr(self, field.name)
+            total += getattr(part, field.name)
         for peaks, more in zip(self.peaks, part.peaks, strict=True):
             peaks.merge(more)
+
+    @property
+    def power_error(self) -> Doubles:
+        """(3, n), standard errors of Σ D h²."""
+        return np.asarray(np.sqrt(self.power_squares))
+
+    def least_power(self, total: Doubles) -> Doubles:
+        """Return the least ‖Φ‖² that each light may have without noise, by its light alone, (3, n).
+
+        That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. total: (3,), Σ D.
+        """
+        is_lit = self.light_squares > 0
+        squares = np.where(is_lit, self.light_squares, 1)
+        least = self.light * _poisson_lower_limit(np.square(self.light) / squares)
+        room = np.maximum(total, np.finfo(float).tiny)[:, None]
+        return np.where(is_lit, np.square(least), 0) / room
+
+
+def _poisson_lower_limit(paths: Doubles) -> Doubles:
+    """Return the least ratios of the true to a measured sum of a number of paths.
+
+    It is Wilson and Hilferty's Poisson limit.
+    """
+    some = np.maximum(paths, MIN_PATHS)
+    limit = 1 - 1 / (9 * some) - NORMAL_95 / (3 * np.sqrt(some))
+    return np.asarray(np.maximum(limit, 0.1) ** 3)
 
 
 @dataclass(frozen=True)
@@ -179,10 +212,15 @@ def dense_rows(
     for first in range(0, len(h), step):
         some = slice(first, first + step)
         half, own_light, row = h[some], lit[some], room[some]
+        if sums is not None:
+            sums.power_squares[c, some] += _fourth_powers(row)
         row[...] = half * pixels.mean + factor(own_light, half, own) * pixels.half
         if sums is not None:
+            weighed = pixels.D * own_light
+            sums.light[c, some] += weighed.sum(axis=1)
+            sums.light_squares[c, some] += np.einsum("ip,ip->i", weighed, weighed)
             size = pixels.missing + pixels.weights[some, None] * own_light
-            sums.peaks[c].add(pixels.D * own_light * size, row, first=first)
+            sums.peaks[c].add(weighed * size, row, first=first)
         if pixels.has_pull:
             power = factor(own_light, half, pixels.own_share_of_pull) * half
             row += pixels.pulled[some, None] * np.where(pixels.unseen, power, 0)
@@ -193,10 +231,17 @@ def dense_rows(
     if pixels.of_light is not None:
         sums.target_noise[c] += lit @ pixels.of_light
         sums.doubt[c] += lit @ pixels.doubt
-    squares = np.square(room)
-    # Fourth powers of light in physical units may be beyond the range of float32.
-    sums.fourth[c] += np.einsum("ip,ip->i", squares, squares, dtype=np.float64)
+    sums.fourth[c] += _fourth_powers(room)
     return room
+
+
+def _fourth_powers(rows: Doubles) -> Doubles:
+    """Return the sum of fourth powers of each row, (n,).
+
+    Of light in physical units they may be beyond the range of float32.
+    """
+    squares = np.square(rows)
+    return np.asarray(np.einsum("ip,ip->i", squares, squares, dtype=np.float64))
 
 
 @dataclass(frozen=True)
@@ -259,7 +304,10 @@ class LitPairs:
         mixed = mixed_with_beside(light, beside, h, pixels.own_share)
         row = h * pixels.mean[at] + mixed * pixels.half[at]
         if sums is not None:
-            could = pixels.D[at] * light * (pixels.missing[at] + pixels.weights[of] * light)
+            weighed = pixels.D[at] * light
+            sums.light[c] += self._of_lights(weighed)
+            sums.light_squares[c] += self._of_lights(np.square(weighed))
+            could = weighed * (pixels.missing[at] + pixels.weights[of] * light)
             sums.peaks[c].add_entries(of, could, row)
         if pixels.has_pull:
             power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
@@ -268,10 +316,14 @@ class LitPairs:
             if pixels.of_noise is not None:
                 flat[self.places] = h
                 sums.target_noise[c] += room @ pixels.of_noise
-            flat[self.places] = np.sqrt(pixels.D)[at] * h
+            rooted = np.sqrt(pixels.D)[at] * h
+            flat[self.places] = rooted
             sums.power[c] += room @ room.T
-            sums.fourth[c] += np.bincount(
-                of, np.square(np.square(row), dtype=np.float64), len(room)
-            )
+            for total, values in ((sums.power_squares, rooted), (sums.fourth, row)):
+                total[c] += self._of_lights(np.square(np.square(values), dtype=np.float64))
         flat[self.places] = row
         return room
+
+    def _of_lights(self, values: npt.NDArray[Any]) -> Doubles:
+        """Return the sum of values, (m,), of each light, (n,)."""
+        return np.bincount(self.lights, values, self.shape[0])

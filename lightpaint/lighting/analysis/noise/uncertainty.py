@@ -23,15 +23,14 @@ is a step, which often only one of them takes: there the changes of both count (
 sure").
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb, release_freed_memory
-from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS
+from lightpaint.arrays import RGB, Bools, Doubles, as_rgb, release_freed_memory
+from lightpaint.basis import FEW_LIGHTS
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
@@ -140,16 +139,12 @@ def noise_doubts(solution: Solution, power: Doubles) -> Doubles:
     return np.where(is_determined, np.clip((shares - low) / (high - low), 0, 1), 0)
 
 
-def weakest_matrix(
-    solution: Solution, power: Doubles, doubts: Doubles, corrected: Doubles
-) -> Doubles:
-    """Return M without noise, as weak as it may be for lights in doubt, (n, 3).
+def weakest_matrix(M: Doubles, noise: Noise, doubts: Doubles, corrected: Doubles) -> Doubles:
+    """Return M, (3, n, n), without noise, as weak as it may be for lights in doubt, (n, 3).
 
-    power: (3, n, n), the noise in M. corrected: (3, n, n), M without as much of it as is safe to
-    remove. Returns (3, n, n), positive semidefinite.
+    corrected: (3, n, n), M without as much of it as is safe to remove. Returns (3, n, n), positive
+    semidefinite.
     """
-    basis, M = solution.basis, solution.equations.M
-    weight = solution.problem.squares.weight
     weakest = corrected.copy()
     in_doubt = np.flatnonzero((doubts > 0).any(axis=1)).tolist()
     if not in_doubt:
@@ -161,20 +156,14 @@ def weakest_matrix(
     is_own = [
         np.einsum("ij,ji->i", x.matrix, y) > OWN for x, y in zip(inverse, weakest, strict=True)
     ]
-    channels = [weight[..., c % weight.shape[2]].ravel() for c in range(3)]
-    totals = [_sum(D) for D in channels]
     for k in with_progress(in_doubt, "lights"):
-        light, half = (planes.lit_plane(k) for planes in (basis.planes, basis.noise))
         for c in (c for c in np.flatnonzero(doubts[k] > 0) if is_own[c][k]):
-            of_light, of_half = ((channels[c][where], x[c]) for where, x in (light, half))
-            smooth = _least_power(*of_light, totals[c])
-            error = _power_error(*of_half)
             # Only the part that no other light can replace may shrink.
             column = inverse[c].column(k)
             noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(column[k])
             least = max(
-                noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
-                alone - float(weakest[c, k, k]) + smooth,
+                noisy - float(noise.power[c, k, k]) - SAFE_ERRORS * float(noise.power_error[c, k]),
+                alone - float(weakest[c, k, k]) + float(noise.least_power[c, k]),
                 MIN_LEFT * float(M[c, k, k]),
             )
             less = doubts[k, c] * max(alone - least, 0)
@@ -207,40 +196,6 @@ class _GrowingInverse:
         if self._count == COLUMNS_AT_A_TIME:
             self.matrix += (self._columns * self._factors) @ self._columns.T
             self._count = 0
-
-
-def _least_power(D: Floats, image: Floats, total: float) -> float:
-    """Return the least ‖Φ‖² that a light may have without noise, by its light alone.
-
-    That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. D, image: (pixels,), where it is not black. total: Σ D.
-    """
-    light = lights = 0.0
-    for d, f in _blocks(D, image):
-        light, lights = light + float(d @ f), lights + float(np.square(d * f).sum())
-    return (light * _poisson_lower_limit(light**2 / lights)) ** 2 / total if lights > 0 else 0.0
-
-
-def _power_error(D: Floats, half: Floats) -> float:
-    """Return the standard error of Σ D h², of half differences, (pixels,)."""
-    return math.sqrt(sum(float(np.square(d * h * h).sum()) for d, h in _blocks(D, half)))
-
-
-def _sum(D: Floats) -> float:
-    return sum(float(d.sum()) for (d,) in _blocks(D))
-
-
-def _blocks(*pixels: Floats) -> Iterator[tuple[Doubles, ...]]:
-    """Yield blocks of pixels in float64."""
-    for start in range(0, pixels[0].size, BLOCK_PIXELS):
-        yield tuple(x[start : start + BLOCK_PIXELS].astype(np.float64) for x in pixels)
-
-
-def _poisson_lower_limit(paths: float) -> float:
-    """Return the least ratio of the true to a measured sum of a number of paths.
-
-    It is Wilson and Hilferty's Poisson limit.
-    """
-    return max(1 - 1 / (9 * paths) - 1.96 / (3 * math.sqrt(paths)), 0.1) ** 3
 
 
 @keywords()
@@ -361,7 +316,7 @@ def error_bars(
         unsteady = solve_for(solution, bent) - weights - bias
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
-        weak = weakest_matrix(solution, noise.power, doubts, unbiased.M)
+        weak = weakest_matrix(solution.equations.M, noise, doubts, unbiased.M)
         # A step from a render of the mix depends on M alone.
         is_refined = problem.refinement is not None
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
