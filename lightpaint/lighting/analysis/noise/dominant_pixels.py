@@ -5,6 +5,7 @@ a few pixels dominate a light, their noise is estimated with the uncertainty of 
 (docs/method.md, "How sure").
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,11 +60,20 @@ class Peaks:
             numbers = u2[light, pixel], np.square(push[light, pixel])
             self.candidates.append((light + first, *numbers))
 
-    def add_entries(self, lights: Indices, could: Doubles, push: Doubles) -> None:
-        """Add a block by its lit pixels: their lights, u and z, (m,) each."""
+    def add_entries(
+        self,
+        lights: Indices,
+        could: Doubles,
+        push: Doubles,
+        of_lights: Callable[[Doubles], Doubles],
+    ) -> None:
+        """Add a block by its lit pixels: their lights, u and z, (m,) each.
+
+        of_lights: returns the sum of values, (m,), of each light, (n,).
+        """
         u2, z2 = np.square(could), np.square(push)
-        self.total += np.bincount(lights, u2, self.total.size)
-        self.pushed += np.bincount(lights, z2, self.total.size)
+        self.total += of_lights(u2)
+        self.pushed += of_lights(z2)
         large = np.flatnonzero(u2 > PEAK_SHARE * self.total[lights])
         if large.size:
             self.candidates.append((lights[large], u2[large], z2[large]))

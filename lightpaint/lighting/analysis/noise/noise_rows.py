@@ -122,8 +122,9 @@ class NoiseSums:
         """Return sums over no pixels."""
         peaks = tuple(Peaks.empty(n) for _ in range(3))
         power, gradient = np.zeros((3, n, n)), np.zeros((3, n, 3, n))
-        target_noise, doubt, *of_lights = np.zeros((6, 3, n))
-        return cls(power, target_noise, doubt, gradient, *of_lights, peaks)
+        target_noise, doubt, light, light_squares, power_squares, fourth = np.zeros((6, 3, n))
+        own = light, light_squares, power_squares, fourth
+        return cls(power, target_noise, doubt, gradient, *own, peaks)
 
     def add(self, part: "NoiseSums") -> None:
         """Add the sums over other pixels."""
@@ -262,7 +263,9 @@ class LitPairs:
     def of(cls, noise: LitEntries, light: LitEntries) -> "LitPairs":
         """Return the lit pixels of half differences and light, of the same pixels."""
         shape = light.shape
-        if np.array_equal(noise.places, light.places):
+        if np.array_equal(noise.lights, light.lights) and np.array_equal(
+            noise.columns, light.columns
+        ):
             values = noise.values, light.values
             return cls(light.lights, light.columns, light.places, *values, shape)
         is_lit = np.zeros(shape[0] * shape[1], np.bool_)
@@ -308,7 +311,7 @@ class LitPairs:
             sums.light[c] += self._of_lights(weighed)
             sums.light_squares[c] += self._of_lights(np.square(weighed))
             could = weighed * (pixels.missing[at] + pixels.weights[of] * light)
-            sums.peaks[c].add_entries(of, could, row)
+            sums.peaks[c].add_entries(of, could, row, self._of_lights)
         if pixels.has_pull:
             power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
             row += pixels.pulled[of] * pixels.unseen[at] * power
@@ -324,6 +327,14 @@ class LitPairs:
         flat[self.places] = row
         return room
 
+    @cached_property
+    def _runs(self) -> Indices:
+        """Where the pixels of another light begin, which follow each other by strips."""
+        return np.flatnonzero(np.diff(self.lights, prepend=-1))
+
     def _of_lights(self, values: npt.NDArray[Any]) -> Doubles:
         """Return the sum of values, (m,), of each light, (n,)."""
-        return np.bincount(self.lights, values, self.shape[0])
+        if not values.size:
+            return np.zeros(self.shape[0])
+        of_runs = np.add.reduceat(values, self._runs, dtype=np.float64)
+        return np.asarray(np.bincount(self.lights[self._runs], of_runs, self.shape[0]), np.float64)
