@@ -102,7 +102,7 @@ export async function mount(element, host, { global = false, engine, isGuided = 
 function listen(app) {
   const { engine, session, store } = app;
   engine.on('message', (message) => session.receive(message));
-  engine.on('frame', () => store.flush());
+  engine.on('frame', () => store.flushFrame());
   engine.on('probed', () => refreshProbe(engine, store));
   engine.on('loading', (loadProgress) => store.set({ loadProgress }));
   engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));

@@ -1,5 +1,5 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
-import { Encoder, SRGB } from './view_transform.js';
+import { encoderOf } from './view_transform.js';
 
 /** @typedef {import("./view.js").Region} Region */
 
@@ -19,7 +19,8 @@ export class Layer {
     const context = this.canvas.getContext('2d', { alpha: false, willReadFrequently: true });
     if (!context) throw new Error('no canvas to draw on');
     this.context = context;
-    this.encoder = new Encoder(SRGB, 0);
+    /** @type {import("./view_transform.js").Encoder | null} */
+    this.encoder = null;
     /** Region whose codes are out of date. @type {Region | null} */
     this.staleRegion = null;
     /** @type {string | null} */
@@ -43,20 +44,19 @@ export class Layer {
    * @param {string | null} overlay its name, null for none
    * @param {(rgba: Uint8ClampedArray) => void} drawOverlay draws it over all codes */
   show(lut, stops, overlay, drawOverlay) {
-    if (lut !== this.encoder.lut || stops !== this.encoder.stops) {
-      this.encoder = new Encoder(lut, stops);
-      this.invalidate();
-    }
+    const encoder = encoderOf(lut, stops);
+    if (encoder !== this.encoder) this.invalidate();
+    this.encoder = encoder;
     if (overlay !== this.drawnOverlay || (overlay && this.staleRegion)) this.invalidate();
     this.drawnOverlay = overlay;
     if (!this.staleRegion || !this.light.length) return;
     const [top, bottom, left, right] = this.staleRegion;
     const { width } = this;
     const rgba = this.image.data;
-    if (right - left === width) this.encoder.pixels(this.light, rgba, top * width, bottom * width);
+    if (right - left === width) encoder.pixels(this.light, rgba, top * width, bottom * width);
     else
       for (let y = top; y < bottom; y++)
-        this.encoder.pixels(this.light, rgba, y * width + left, y * width + right);
+        encoder.pixels(this.light, rgba, y * width + left, y * width + right);
     if (overlay) drawOverlay(rgba);
     this.context.putImageData(this.image, 0, 0, left, top, right - left, bottom - top);
     this.staleRegion = null;

@@ -35,6 +35,19 @@ export function decodeSrgb(display) {
 const TABLE_BITS = 9;
 const SHIFT = 23 - TABLE_BITS;
 
+/** The last encoder of each view transform. @type {WeakMap<Readonly<Lut>, Encoder>} */
+const encoders = new WeakMap();
+
+/** Return the encoder of a view transform at an exposure: its tables take longer than a frame.
+ * @param {Readonly<Lut>} lut @param {number} stops */
+export function encoderOf(lut, stops) {
+  const known = encoders.get(lut);
+  if (known?.stops === stops) return known;
+  const encoder = new Encoder(/** @type {Lut} */ (lut), stops);
+  encoders.set(lut, encoder);
+  return encoder;
+}
+
 /**
  * Computes codes of many pixels. The upper bits of a float are a piecewise linear logarithm. They
  * index a table of codes if there is a curve, else of coordinates in the lattice. The table

@@ -109,6 +109,7 @@ def test_a_change_that_can_wait_is_shown_with_the_next_or_soon(page: Any):
           store.listen(() => seen.push({ ...store.value }));
           store.setWithNext({ a: 1 });
           await frame();
+          store.flushFrame(); // of a frame that no change waits for
           const waiting = seen.length;
           store.setForFrame({ b: 1 });
           await frame();

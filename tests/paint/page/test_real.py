@@ -367,7 +367,21 @@ def test_answers_of_many_lights_are_mixed_by_the_session(
         fetched: list[str] = []
         user.page.on("request", lambda request: fetched.append(request.url))
         before = user.seen(70, 40, 1)
-        user.press("0").stroke((20, 10), (40, 10)).still("brush")
+        user.look(
+            "const send = host.send.bind(host); window.drafts = [];"
+            " host.send = async (kind, fields, arrays) => {"
+            " const reply = await send(kind, fields, arrays);"
+            " if (kind === 'paint') window.drafts.push(Boolean(reply.arrays.draft));"
+            " return reply; }"
+        )
+        user.press("0").drag(user.at(20, 10), user.at(40, 10), hold=True)
+        wait_until(lambda: user.page.evaluate("() => window.drafts.length"), "no answer")
+        # While the brush is down, no question about shares keeps answers waiting.
+        asked = [url.partition("lights_at/")[2] for url in fetched if "lights_at/" in url]
+        assert set(asked) <= {"10%2C20"}, asked  # where the pointer came before
+        user.page.mouse.up()
+        user.still("brush")
+        assert all(user.page.evaluate("() => window.drafts"))
 
         def shows(weights: Any) -> None:
             light = denoise_mix(basis, weights)

@@ -12,7 +12,7 @@ import { DEFAULT_TOOL, LABELS, Stroke, adjustArea, tintArea } from './stroke.js'
 import { Emitter, SocketHost } from './socket_host.js';
 import { CpuView } from '../../../viewer/drawing/cpu.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
-import { Encoder } from '../../../viewer/drawing/view_transform.js';
+import { encoderOf } from '../../../viewer/drawing/view_transform.js';
 import { maxImportance } from '../../../viewer/drawing/overlay.js';
 import { Screen } from './picture_canvas.js';
 import { hitTest, zoomAround } from '../../../viewer/drawing/view.js';
@@ -81,8 +81,6 @@ class PictureEngine extends Emitter {
     this.stroke = null;
     /** @type {ToolSettings} */
     this.tool = DEFAULT_TOOL;
-    /** @type {Encoder | null} */
-    this.encoder = null;
   }
 
   // Display
@@ -163,7 +161,7 @@ class PictureEngine extends Emitter {
     const { canvas, state, weights } = this.mirror;
     if (!place || !this.screen.view || !canvas || !state) return null;
     const planes = this.mirror.hasMixes
-      ? this.mirror.mixes.lightsAt(...place, () => this.emit('probed', {}))
+      ? this.lightsAt(place)
       : this.screen.view.planesAt(...place);
     const light = planes?.map((value, i) => value * weights[i]) ?? new Float32Array(weights.length);
     const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
@@ -173,6 +171,13 @@ class PictureEngine extends Emitter {
     const index = canvas.objectAt(...place);
     const object = state.objects?.[index] ?? null;
     return { object, index, shares: levels.map((level) => (total > 0 ? level / total : 0)) };
+  }
+
+  /** Return the light of each lamp around a pixel that the session has; null until it is here. While a
+   * stroke goes on it is not asked for, since its answers come first.
+   * @param {[number, number]} place */
+  lightsAt(place) {
+    return this.isPainting ? null : this.mirror.mixes.lightsAt(...place, () => this.emit('probed', {}));
   }
 
   /** Return the object index of each pixel, once known.
@@ -194,12 +199,9 @@ class PictureEngine extends Emitter {
     return [...rgba.subarray(0, 3)];
   }
 
-  /** @param {number} stops @returns {Encoder} */
+  /** @param {number} stops */
   encoderAt(stops) {
-    const { lut } = this.mirror;
-    if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
-      this.encoder = new Encoder(lut, stops);
-    return this.encoder;
+    return encoderOf(this.mirror.lut, stops);
   }
 
   /** Return the display codes of a picture as it is displayed, whole and at reduced size; null before
@@ -255,6 +257,11 @@ class PictureEngine extends Emitter {
   /** @param {ToolSettings} settings */
   setTool(settings) {
     this.tool = settings;
+  }
+
+  /** Whether a stroke goes on. */
+  get isPainting() {
+    return this.stroke !== null;
   }
 
   /** The target of strokes, if painting is possible. */

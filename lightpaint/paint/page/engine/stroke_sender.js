@@ -250,7 +250,8 @@ export class StrokeSender {
       next.isSent = true;
       this.send('change_layers', next.change, {}, next);
     } else if (next && 'select' in next) this.send('select', next.select, next.arrays, next);
-    else if (next) this.send('paint', paintFields(next), cutArrays(next), next);
+    else if (next)
+      this.send('paint', { ...paintFields(next), draft_step: this.draftStep() }, cutArrays(next), next);
     else if (this.currentStroke?.dirty) {
       const { stroke, view, dirty, canvas, layerOf } = this.currentStroke;
       this.currentStroke.dirty = null;

@@ -68,7 +68,8 @@ export function reportProbe(engine, store, x, y) {
     pendingReports.delete(store);
     const pane = paneAt(engine, place.x, place.y);
     const probe = pane && probePane(engine, pane, place.x, place.y);
-    if (probe || store.value.probe) store.set({ probe });
+    if (engine.isPainting) store.setWithNext({ probe });
+    else if (probe || store.value.probe) store.set({ probe });
   });
 }
 

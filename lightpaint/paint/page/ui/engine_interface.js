@@ -98,6 +98,7 @@
  *   the pictures of a dragged light show; null: no light is dragged
  * @property {number} minDraftStep the smallest such step with which they are drawn in time
  * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
+ * @property {boolean} isPainting whether a stroke goes on
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move
  * @property {() => void} end

@@ -166,8 +166,9 @@ export class SessionLink {
       if (changes?.[key] !== undefined) Object.assign(this.confirmedState, { [key]: changes[key] });
     if (changes?.weights) changes.weights = this.applyMoves(changes.weights);
     if (changes?.master !== undefined) changes.master = this.masterInHand ?? changes.master;
-    // Several messages answer each move of a light.
+    // Several messages answer each move of a light. Under a brush the pictures come first.
     if (changes && this.store.value.drag) this.store.setForFrame(changes);
+    else if (changes?.isLive) this.store.setWithNext(changes);
     else if (changes) this.store.set(changes);
     if (changes?.constraints) this.forgetUnlocked(changes.constraints);
   }

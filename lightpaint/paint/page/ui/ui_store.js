@@ -41,10 +41,14 @@ export class Store {
     this.change(changes);
     if (this.isFrameRequested) return;
     this.isFrameRequested = true;
-    requestAnimationFrame(() => {
-      this.isFrameRequested = false;
-      this.flush();
-    });
+    requestAnimationFrame(() => this.flushFrame());
+  }
+
+  /** Notify listeners of changes that wait for the frame. */
+  flushFrame() {
+    if (!this.isFrameRequested) return;
+    this.isFrameRequested = false;
+    this.flush();
   }
 
   /** Change part of the state, and notify listeners with the next change, or soon.

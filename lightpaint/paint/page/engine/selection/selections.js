@@ -1,7 +1,7 @@
 /** What a person selects: a shape, an object, colours, what a light lights; and changes of it. */
 import { nameInView } from '../message_frames.js';
 import { VALUES, toFloats } from '../../../../viewer/drawing/half_floats.js';
-import { Encoder } from '../../../../viewer/drawing/view_transform.js';
+import { encoderOf } from '../../../../viewer/drawing/view_transform.js';
 import { feathered, grown, inverted, joined } from './mask_operations.js';
 import { FULL, ellipse, polygonMask, rectangle } from './polygon_mask.js';
 import { OTHER_SLOT, SOLUTION_SLOT } from '../session_mixes.js';
@@ -165,7 +165,7 @@ export class Selections {
     if (!light) return null;
     const codes = new Uint8ClampedArray((light.length / 3) * 4);
     const { lut, display } = this.session;
-    new Encoder(lut, display?.stops ?? 0).pixels(light, codes, 0, light.length / 3);
+    encoderOf(lut, display?.stops ?? 0).pixels(light, codes, 0, light.length / 3);
     return codes;
   }
 
