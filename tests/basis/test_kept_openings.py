@@ -10,7 +10,7 @@ import lightpaint as lp
 from lightpaint.basis.cache import basis_cache, opening
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.deferred_planes import DeferredPlanes
-from lightpaint.basis.plane_results import array_name, array_once
+from lightpaint.basis.plane_results import array_name, array_once, known_arrays
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import RowFile
 
@@ -79,6 +79,40 @@ def test_a_damaged_file_of_known_walks_is_as_none(kept: lp.Basis) -> None:
     path = basis_cache.companion_path(kept, basis_cache.OPENING_SUFFIX)
     path.write_bytes(path.read_bytes()[:-40])
     assert find(kept) is None
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
+def test_a_changed_byte_of_known_walks_is_found(kept: lp.Basis, share: float) -> None:
+    path = basis_cache.companion_path(kept, basis_cache.OPENING_SUFFIX)
+    data = bytearray(path.read_bytes())
+    data[int(share * len(data))] ^= 1
+    path.write_bytes(data)
+    assert find(kept) is None
+
+
+def test_numpy_reads_the_same_and_what_is_kept_is_not_read_to_keep_it_again(
+    kept: lp.Basis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = basis_cache.companion_path(kept, basis_cache.OPENING_SUFFIX)
+    opened = find(kept)
+    assert opened is not None
+    known = known_arrays(opened.planes)
+    assert known
+    with np.load(path) as arrays:
+        for name, array in known.items():
+            np.testing.assert_array_equal(arrays[f"images {name}"], array)
+    before, read = path.stat().st_ino, opening._array
+
+    def content_alone(archive: Any, name: str) -> Any:
+        assert name == opening.CONTENT
+        return read(archive, name)
+
+    monkeypatch.setattr(opening, "_array", content_alone)
+    assert opening.keep_opening(opened)
+    assert path.stat().st_ino == before
+    array_once(opened.planes, "one more", lambda: np.zeros(3))
+    assert opening.keep_opening(opened)
+    assert path.stat().st_ino != before
 
 
 def test_damaged_pixels_are_found_by_the_first_walk(kept: lp.Basis) -> None:

@@ -5,9 +5,11 @@ picture and its first strokes: the present look, the power of each light, and av
 """
 
 import hashlib
+import io
 import zipfile
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,13 @@ from lightpaint.files import replacing
 from lightpaint.images.formats import RowsUnsupportedError
 
 FORMAT, CONTENT = "lightpaint-opening 1", "opening_of"
+
+#: Suffix of the arrays in an archive of NumPy, and what reads the header of each version of them.
+NPY = ".npy"
+READ_HEADER = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 #: Prefixes of names of arrays that follow from images, and from noise.
 PREFIXES = "images ", "noise "
@@ -72,7 +81,7 @@ def keep_opening(basis: Basis) -> bool:
     try:
         content = DeferredFile(basis_cache.file_of(basis) or Path(basis.source)).content
         path = basis_cache.companion_path(basis, basis_cache.OPENING_SUFFIX)
-        if (kept := _read(path, content)) is not None and kept.keys() >= arrays.keys():
+        if _kept_names(path, content) >= arrays.keys():
             return True
         with replacing(path) as place, place.open("wb") as file:
             kept_arrays: dict[str, Any] = {CONTENT: np.array(_digest(content)), **arrays}
@@ -82,15 +91,45 @@ def keep_opening(basis: Basis) -> bool:
     return True
 
 
+def _kept_names(path: Path, content: str) -> set[str]:
+    """Return the names of the arrays that are kept."""
+    with suppress(*_READ_ERRORS, LightpaintError), _opened(path, content) as archive:
+        return _names(archive)
+    return set()
+
+
 def _read(path: Path, content: str) -> Arrays | None:
-    with suppress(*_READ_ERRORS, LightpaintError):
-        if not basis_cache.is_own(path):
-            return None
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            if str(arrays[CONTENT]) == _digest(content):
-                path.touch()
-                return {name: arrays[name] for name in arrays.files if name != CONTENT}
+    with suppress(*_READ_ERRORS, LightpaintError), _opened(path, content) as archive:
+        path.touch()
+        return {name: _array(archive, name) for name in _names(archive)}
     return None
+
+
+@contextmanager
+def _opened(path: Path, content: str) -> Iterator[zipfile.ZipFile]:
+    """Open a kept file of a basis with this content. Raises ValueError for another's."""
+    if not basis_cache.is_own(path):
+        raise ValueError("it is not the user's")
+    with zipfile.ZipFile(path) as archive:
+        if str(_array(archive, CONTENT)) != _digest(content):
+            raise ValueError("it is kept of another basis")
+        yield archive
+
+
+def _names(archive: zipfile.ZipFile) -> set[str]:
+    return {name.removesuffix(NPY) for name in archive.namelist()} - {CONTENT}
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
+    """Return an array, read-only. NumPy reads those of an archive in small pieces.
+
+    Raises one of `_READ_ERRORS` for a damaged one.
+    """
+    data = archive.read(name + NPY)
+    stream = io.BytesIO(data)
+    shape, is_fortran, kind = READ_HEADER[np.lib.format.read_magic(stream)](stream)
+    numbers = np.frombuffer(data, kind, prod(shape), stream.tell())
+    return numbers.reshape(shape, order="F" if is_fortran else "C")
 
 
 def _digest(content: str) -> str:
