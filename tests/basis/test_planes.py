@@ -468,6 +468,20 @@ def test_spooled_planes_are_made_once_and_those_in_memory_stay(
     assert spooled(in_memory) is in_memory
 
 
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_spooled_planes_have_all_rows_whatever_strips_they_lie_in(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
+    """The last strip is shorter, and rows begin and end within strips, or outside the picture."""
+    monkeypatch.setattr(SpooledPlanes, "strip_rows", step)
+    planes = SpooledPlanes(CountedPlanes(images))
+    check_alike(planes, images)
+    height = images.shape[1]
+    for top in range(height):
+        for bottom in range(top, height + 2):
+            np.testing.assert_array_equal(planes.rows(top, bottom), images[:, top:bottom])
+
+
 def test_planes_are_made_again_where_a_disk_is_full(
     images: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:

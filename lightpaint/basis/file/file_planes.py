@@ -380,48 +380,70 @@ def spooled(planes: Planes) -> Planes:
     return planes
 
 
-def fill_channels(
-    planes: RowPlanes, into: Floats, written: Callable[[], None] = lambda: None
-) -> None:
-    """Copy planes strip by strip `into` an array, (n, 3, h, w), channels first: so they are summed.
-
-    written: called after each strip.
+def fill_channels(planes: RowPlanes, into: Floats) -> None:
+    """Copy planes strip by strip `into` an array, (n, 3, h, w), channels first: so they are
+    summed.
     """
     step = planes.strip_rows
     for top in range(0, planes.size[0], step):
         rows = planes.rows(top, min(top + step, planes.size[0]))
         into[:, :, top : top + step] = rows.transpose(0, 3, 1, 2)
-        written()
 
 
 class SpooledPlanes(RowPlanes):
-    """A copy of planes in a temporary file. Raises OSError if the disk is full."""
+    """A copy of planes in a temporary file, strip by strip, each of which is read at once.
+
+    Raises OSError if the disk is full.
+    """
 
     def __init__(self, planes: RowPlanes) -> None:
-        self._file = TemporaryArray((planes.count, 3, *planes.size))
-        fill_channels(planes, self._file.array, self._file.release)
+        self._count, self._size = planes.count, planes.size
+        self._file = TemporaryArray((planes.count * 3 * planes.size[0] * planes.size[1],))
+        for top, bottom in self._ranges(0, planes.size[0]):
+            rows = planes.rows(top, bottom)
+            self._file.write(self._place(top), rows.transpose(0, 3, 1, 2))
 
     @property
     def count(self) -> int:
         """Number of lights."""
-        return int(self._file.array.shape[0])
+        return self._count
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        height, width = self._file.array.shape[2:]
-        return height, width
+        return self._size
+
+    def _ranges(self, top: int, bottom: int) -> list[tuple[int, int]]:
+        """Return the first row and the end of each strip that some rows touch."""
+        step, height = self.strip_rows, self._size[0]
+        starts = range(top // step * step, bottom, step)
+        return [(start, min(start + step, height)) for start in starts]
+
+    def _place(self, top: int) -> int:
+        """Return the number of values before the strip that begins at a row."""
+        return 3 * self._count * top * self._size[1]
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        image = np.ascontiguousarray(self._file.array[i].transpose(1, 2, 0))
-        self._file.release()
+        height, width = self._size
+        image = np.empty((height, width, 3), np.float32)
+        for top, bottom in self._ranges(0, height):
+            strip = np.empty((3, bottom - top, width), np.float32)
+            self._file.read(self._place(top) + i * strip.size, strip)
+            image[top:bottom] = strip.transpose(1, 2, 0)
         return image
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
-        block = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
-        self._file.release()
+        top, bottom = max(top, 0), min(bottom, self._size[0])
+        parts = []
+        for first, end in self._ranges(top, bottom):
+            strip = np.empty((self._count, 3, end - first, self._size[1]), np.float32)
+            self._file.read(self._place(first), strip)
+            parts.append(strip[:, :, max(top - first, 0) : bottom - first])
+        if not parts:
+            return np.zeros((self._count, 0, self._size[1], 3), np.float32)
+        block = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
         return block.transpose(0, 2, 3, 1)
 
 
