@@ -15,7 +15,7 @@ from lightpaint.cli.options.parser import COMMANDS, command_parser
 from lightpaint.cli.output import lines
 from lightpaint.cli.output.lines import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
-from lightpaint.errors import BatchError, LightpaintError, refusal_of
+from lightpaint.errors import BackendError, BatchError, LightpaintError, refusal_of
 
 #: The scene or the film needs too much memory, which is not a bug.
 OUT_OF_MEMORY_TEXT = (
@@ -25,8 +25,13 @@ OUT_OF_MEMORY_TEXT = (
 
 
 #: Errors of too little memory, or too low a limit, that are not MemoryError: of Python where no
-#: thread can be started, and of the loader where there is no room for a library.
-NO_ROOM_TEXTS = "can't start new thread", "failed to map segment from shared object"
+#: thread or lock can be made, and of the loader where there is no room for a library.
+NO_ROOM_TEXTS = (
+    "can't start new thread",
+    "can't allocate lock",
+    "can't allocate read lock",
+    "failed to map segment from shared object",
+)
 
 
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
@@ -114,6 +119,10 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (error.sentence,):
             lines.complain(command, spoken(line))
+        if _is_half_imported(error):
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(2)
         return 2
     if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:
         lines.complain(command, str(refusal))
@@ -122,6 +131,12 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
         lines.complain(command, OUT_OF_MEMORY_TEXT)
         return 2
     return report_fault(command, error, words)
+
+
+def _is_half_imported(error: LightpaintError) -> bool:
+    """Return whether Mitsuba has started in part, which would abort Python at its end."""
+    is_missing = isinstance(error.__cause__, ModuleNotFoundError | None)
+    return isinstance(error, BackendError) and not is_missing and "mitsuba" not in sys.modules
 
 
 #: Suffixes of files by the destination of an argument; other arguments take any file.

@@ -1,13 +1,16 @@
 """What nobody foresaw is one line and a code of its own; what Mitsuba cannot render is an error."""
 
 import errno
+import os
 import re
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from command import run, run_refused
-from renderer import write_room
+from renderer import REPOSITORY, write_room
 
 import lightpaint as lp
 from lightpaint.cli import dispatcher
@@ -82,6 +85,24 @@ def test_too_little_memory_is_no_fault(tmp_path: Path, monkeypatch: pytest.Monke
     assert "--resolution 1/2" in line
 
 
+@pytest.mark.parametrize("kind", ["ImportError", "NameError", "RuntimeError"])
+def test_half_a_mitsuba_neither_is_called_missing_nor_aborts(tmp_path: Path, kind: str) -> None:
+    """With too little memory its extension module starts in part, and Python's end aborts."""
+    (tmp_path / "mitsuba.py").write_text(
+        f"import atexit, os\natexit.register(os.abort)\nraise {kind}('an error while starting')"
+    )
+    scene = write_room(tmp_path)
+    command = [sys.executable, "-m", "lightpaint", "lights", str(scene)]
+    path = os.pathsep.join([str(tmp_path), str(REPOSITORY)])
+    environment = {**os.environ, "PYTHONPATH": path}
+    completed = subprocess.run(
+        command, capture_output=True, text=True, env=environment, check=False
+    )
+    assert completed.returncode == 2, completed.stderr
+    [line] = completed.stderr.splitlines()
+    assert "Mitsuba is installed and cannot start (an error while starting)" in line
+
+
 def test_where_nothing_can_be_written_it_is_one_line_still(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,6 +166,7 @@ def test_no_room_for_a_thread_or_a_library_is_no_bug(
 ) -> None:
     for error in (
         RuntimeError("can't start new thread"),
+        RuntimeError("can't allocate read lock"),
         ImportError("libscipy_openblas.so: failed to map segment from shared object"),
     ):
         make_fail(monkeypatch, error)

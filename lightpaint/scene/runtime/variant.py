@@ -159,8 +159,14 @@ def _start(requested: str | None) -> Backend:
     llvm = prepare_llvm() if needs_llvm else None
     try:
         import mitsuba as mi
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise BackendError(f"Mitsuba cannot be imported ({error}): pip install mitsuba") from error
+    # Dr.Jit's own report of a failed start has a NameError.
+    except (ImportError, NameError, RuntimeError) as error:
+        raise BackendError(
+            f"Mitsuba is installed and cannot start ({error}): close other programs, since it may "
+            "lack memory; or pip install --force-reinstall mitsuba"
+        ) from error
 
     # A notebook or a script may have set a variant already, which is respected.
     current = mi.variant()
