@@ -1,7 +1,8 @@
 """Runs in Blender: multiplies lights whose colour something else multiplies, too, and prints how.
 
-Arguments: the working space; "script" for set_lights.py, "addon" for the add-on; and a folder
-with the script and the multipliers. Not a test by itself: test_working_spaces.py runs it.
+Arguments: the working space; "script" for set_lights.py, "keys" for one that animates, at frame 3,
+"addon" for the add-on; and a folder with the script and the multipliers. Not a test by itself:
+test_working_spaces.py runs it.
 """
 
 import json
@@ -127,9 +128,10 @@ def main():
     scene.camera = camera
     items = lights()
     before = radiances(items)
-    if WAY == "script":
+    if WAY != "addon":
         for _ in range(2):
             runpy.run_path(str(FOLDER / "set_lights.py"))
+        scene.frame_set(3)
         after = radiances(items)
     else:
         import lightpaint_addon.lamps.lamp_levels as levels

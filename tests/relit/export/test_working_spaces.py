@@ -27,19 +27,22 @@ FACTORS = {
 NOISE = 2e-3
 
 
-@pytest.mark.parametrize("way", ["script", "addon"])
+@pytest.mark.parametrize("way", ["script", "addon", nightly("keys")])
 @pytest.mark.parametrize("space", ["ACEScg", nightly("Linear Rec.2020")])
 def test_what_is_textured_or_tinted_is_multiplied_in_rec709(
     tmp_path: Path, new_blender: list[str], space: str, way: str
 ) -> None:
     if not has_working_spaces(new_blender):
         pytest.skip("Blender 5 (LIGHTPAINT_BPY: a Python with its module bpy)")
+    # Half-way between two keys without slopes is their mean.
+    still = (0.0, 0.0, 0.0)
+    keys = {name: [(1, (1.0,) * 3, still), (5, factor, still)] for name, factor in FACTORS.items()}
     text = filled_script(
         "set_lights.py.in",
         target="evening",
         source="shot.exr",
         multipliers=repr(FACTORS),
-        keys="{}",
+        keys=repr(keys if way == "keys" else {}),
         render=repr("render"),
     )
     (tmp_path / "set_lights.py").write_text(text, encoding="utf-8")
@@ -52,7 +55,8 @@ def test_what_is_textured_or_tinted_is_multiplied_in_rec709(
     lines = [line for line in output.splitlines() if line.startswith("SEEN ")]
     before, after = json.loads(lines[0].partition(" ")[2])
     to_file = from_rec709({"ACEScg": ACESCG, "Linear Rec.2020": REC2020}[space])
-    for name, factor in FACTORS.items():
+    for name, whole in FACTORS.items():
+        factor = (1 + np.array(whole)) / 2 if way == "keys" else whole
         shown = np.linalg.solve(to_file, before[name]) * factor
         expected = to_file @ shown
         # Light cannot be negative, which colours outside the space would have to be.
