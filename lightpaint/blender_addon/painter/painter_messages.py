@@ -163,7 +163,7 @@ class PainterState:
             return False
         master = content.get("master")
         if master is not None and (type(master) not in (int, float) or not is_amount(master)):
-            raise MessageError(f"the master dimmer is {str(master)[:40]}")
+            raise MessageError(f"a master dimmer at {str(master)[:40]}")
         master = self.master if master is None else float(master)
         weights = buffers.get("weights", self._weights)
         if len(weights) != 3 * len(self.lights):
