@@ -13,6 +13,7 @@ from types import FrameType
 from typing import Any
 
 from lightpaint.errors import BackendError
+from lightpaint.files import first_line
 from lightpaint.keywords import keywords
 from lightpaint.luminaires.registration import register_luminaires
 from lightpaint.scene.runtime.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
@@ -161,10 +162,11 @@ def _start(requested: str | None) -> Backend:
         import mitsuba as mi
     except ModuleNotFoundError as error:
         raise BackendError(f"Mitsuba cannot be imported ({error}): pip install mitsuba") from error
-    # Dr.Jit's own report of a failed start has a NameError.
     except (ImportError, NameError, RuntimeError) as error:
+        # Dr.Jit's own report of a failed start has a NameError in it.
+        reason = first_line(error.__context__ or error)
         raise BackendError(
-            f"Mitsuba is installed and cannot start ({error}): close other programs, since it may "
+            f"Mitsuba is installed and cannot start ({reason}): close other programs, since it may "
             "lack memory; or pip install --force-reinstall mitsuba"
         ) from error
 
