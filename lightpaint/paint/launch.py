@@ -57,6 +57,8 @@ def paint_in_browser(
     path = folder / SESSION_FILE
     listening = listen(host, port)  # before anything is written
     with listening[0]:
+        for subject in subjects:
+            subject.check_files()
         _serve_session(listening, subjects, on_ready, path, new=new, console=console, say=say)
 
 
@@ -124,11 +126,15 @@ class SessionFile:
         identity = session_identity(subjects)
         self._is_unused = identity is None and not path.exists()
         self.store = Store.open(path, identity)
-        for k, subject in enumerate(subjects):
-            if subject.record is not None and isinstance(subject.scene, LazyScene):
-                self._report_new(subject.scene.remarks)
-            elif isinstance(subject.scene, LazyScene):
-                subject.scene.checks.append(partial(self._on_scene_loaded, k, subject.scene))
+        try:
+            for k, subject in enumerate(subjects):
+                if subject.record is not None and isinstance(subject.scene, LazyScene):
+                    self._report_new(subject.scene.remarks)
+                elif isinstance(subject.scene, LazyScene):
+                    subject.scene.when_loaded(partial(self._on_scene_loaded, k, subject.scene))
+        except BaseException:
+            self.close()
+            raise
 
     def open_store(self, _: Identity) -> Store:
         """Return the store; called when there are bases."""

@@ -16,6 +16,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line, scene_name
 from lightpaint.lighting import Constraints
+from lightpaint.paint.layers.layer_files import read_layers
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline import SceneFile, vars_of
@@ -81,6 +82,13 @@ class LazyScene:
             if self._scene is None:
                 self._scene = self._load()
             return self._scene
+
+    def when_loaded(self, check: Callable[[Scene], None]) -> None:
+        """Call `check` with the scene once it is loaded; at once if it is."""
+        with self._lock:
+            self.checks.append(check)
+            if self._scene is not None:
+                check(self._scene)
 
     def _load(self) -> Scene:
         # Imported here: the first scene loads the renderer.
@@ -181,6 +189,21 @@ class Subject:
         """Load a scene without cached facts, so that its errors show at once."""
         if self.scene is not None and self.record is None:
             _ = self.loaded_scene
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) of the view."""
+        return (self.basis or self.record or self.loaded_scene).size
+
+    def check_files(self) -> None:
+        """Load a scene without cached facts, and read the file of layers, so that mistakes show.
+
+        Raises LightpaintError if the view cannot be painted, or not with these layers.
+        """
+        self.prepare()
+        if self.layers is not None:
+            # Which transform it is painted through is known with its basis, and refuses nothing.
+            read_layers(self.layers, self.size, ViewTransform("srgb"))
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
         """Yield its basis; one that is still to be rendered follows previews of few samples."""

@@ -22,7 +22,9 @@ from command import as_from_a_terminal, run, run_refused
 from light_groups import interleaved, pictures
 from nightly import nightly
 from patience import PATIENCE_S
+from picture_files import layered
 from raw_message import RawMessage
+from renderer import write_room
 from rig_files import EXAMPLE
 from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
@@ -153,6 +155,27 @@ def test_what_cannot_be_painted_is_said_in_one_line(
     work_folder: Path, line: str, message: str
 ) -> None:
     assert re.search(message, run_refused(work_folder, "paint", *line.split(), "--no-browser"))
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("room.basis.exr --layers empty.ora", "empty.ora is damaged: it lacks"),
+        ("room.xml --off lamp", "no light 'lamp'; there are panel, bulb, beam, sun, sky"),
+        nightly("room.xml --layers empty.ora", "empty.ora is damaged: it lacks"),
+        nightly("room.xml --sensor side", "has no sensor 'side'"),
+        nightly("room.xml --resolution 7x3", "cannot be reduced to 7x3"),
+        nightly("room.xml --split lamp=2x2", "no light 'lamp' to split"),
+        nightly("empty.ora", "is not a scene"),
+    ],
+)
+def test_a_mistake_that_files_show_is_said_before_there_is_an_address(
+    work_folder: Path, line: str, message: str
+) -> None:
+    write_room(work_folder)
+    (work_folder / "empty.ora").write_bytes(layered(None))
+    arguments = *line.split(), "--no-browser", "--port", "0"
+    assert message in run_refused(work_folder, "paint", *arguments)
 
 
 @pytest.mark.usefixtures("work_folder")

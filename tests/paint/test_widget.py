@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from nightly import nightly
 from patience import PATIENCE_S
+from picture_files import layered
 from renderer import LIGHTS, REPOSITORY, write_room
 
 import lightpaint as lp
@@ -377,7 +378,9 @@ def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_painte
 def test_what_cannot_be_given_is_said_at_once(
     basis: lp.Basis, open_painter: Any, tmp_path: Path
 ) -> None:
+    (tmp_path / "empty.ora").write_bytes(layered(None))
     for options, message in (
+        ({"layers": tmp_path / "empty.ora"}, r"empty\.ora is damaged: it lacks"),
         ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
         ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
         ({"layers": 5}, "layers is 5: expected the path of a file"),

@@ -280,7 +280,7 @@ def widget_subjects(
     sources = list(value) if isinstance(value, list | tuple) else [value]
     if not sources:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
-    return make_subjects(
+    subjects = make_subjects(
         [_loaded(source) for source in sources],
         None if folder is None else Path(folder).absolute(),
         settings=settings,
@@ -288,6 +288,9 @@ def widget_subjects(
         choice=TransformChoice.of(transform),
         layers=None if layers is None else Path(layers),
     )
+    for subject in subjects:
+        subject.check_files()
+    return subjects
 
 
 def _check_types(*, constraints: Any, transform: Any) -> None:
