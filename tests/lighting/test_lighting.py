@@ -63,7 +63,7 @@ def test_an_unknown_name_is_one_line_and_a_key_error(lighting: lp.Lighting):
         ({"lamp": 2}, [[0] * 3, [2] * 3, [1] * 3]),
         ({"lamp": 2, "key": [1, 0.5, 0]}, [[1, 0.5, 0], [2] * 3, [1] * 3]),
         ({"rest": 1}, [[0] * 3, [0] * 3, [1] * 3]),
-        ({}, [[0] * 3, [0] * 3, [1] * 3]),
+        ([0, 0, 1], [[0] * 3, [0] * 3, [1] * 3]),
         ([3, 2, 1], [[3] * 3, [2] * 3, [1] * 3]),
         (np.array([3, 2, 1], np.int8), [[3] * 3, [2] * 3, [1] * 3]),
         ([[1, 2, 3], [4, 5, 6], [1, 1, 1]], [[1, 2, 3], [4, 5, 6], [1] * 3]),
@@ -83,6 +83,7 @@ def test_combine_takes_weights(basis: lp.Basis, weights_argument: Any, weights: 
 @pytest.mark.parametrize(
     ("invalid_weights", "words"),
     [
+        ({}, "names no light: give the weight of one at least, like {'key': 1}, or an array of 3"),
         ({"lmap": 2}, "no light lmap in the basis: it has key, lamp, rest"),
         ({3: 2}, "no light 3 in the basis"),
         (

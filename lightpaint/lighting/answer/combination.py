@@ -24,9 +24,9 @@ def combine(
 
     Args:
         basis: Of n lights.
-        lighting: Of the same lights; or weights >= 0 of some of them by name, a number or RGB each,
-            the others being off; or (n,) or (n, 3) weights in the order of the basis. Fixed lights
-            have the weight 1.
+        lighting: Of the same lights; or weights >= 0 of one or more of them by name, a number or
+            RGB each, the others being off; or (n,) or (n, 3) weights in the order of the basis.
+            Fixed lights have the weight 1.
 
     Raises:
         LightingError: If the two do not name the same lights, or for invalid weights.
@@ -72,6 +72,11 @@ def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles
     n, names = len(basis.lights), basis.names
     weights = np.where(basis.is_fixed[:, None], np.ones(3), np.zeros(3))
     if isinstance(values, Mapping):
+        if not values:
+            raise LightingError(
+                f"the lighting names no light: give the weight of one at least, like "
+                f"{{{names[0]!r}: 1}}, or an array of {n} weights, like zeros for darkness"
+            )
         if unknown := [str(name) for name in values if name not in names]:
             raise UnknownLightError(
                 f"no light {some_of(unknown, room=400)} in the basis: it has "
