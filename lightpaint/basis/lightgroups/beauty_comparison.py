@@ -56,7 +56,10 @@ def describe_sum(
     if truly_missing + truly_exceeding <= negligible_share(layers):
         deviation = f"to {missing + exceeding:.1g} of its light"
         if lossy and missing + exceeding > NEGLIGIBLE_SHARE:
-            deviation += f", as exactly as the lossy compression {lossy} stores them"
+            deviation += (
+                f", as exactly as the lossy compression {lossy} stores them, which may hide a lamp "
+                f"of up to {share_text(hidden_share(layers, whole))} of it"
+            )
         return f"the groups add up to the beauty ({deviation})", False
     text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
@@ -102,6 +105,17 @@ def negligible_share(layers: Sequence[RenderLayer]) -> float:
     reported.
     """
     return LOSSY_SHARE if any(map(_is_lossy, layers)) else NEGLIGIBLE_SHARE
+
+
+def hidden_share(layers: Sequence[RenderLayer], whole: Floats) -> float:
+    """Return the largest share of the beauty, (h, w, 3), that a lamp in none of the layers may have
+    where the layers seem to add up to it.
+
+    Its light may be as large as the rounding of the sum everywhere, and `negligible_share` beyond.
+    """
+    total = float((np.abs(whole) @ LUMINANCE).sum())
+    rounded = float((rounding(layers) @ LUMINANCE).sum())
+    return min(rounded / total, 1.0) + negligible_share(layers) if total > 0 else 0.0
 
 
 def _is_lossy(layer: RenderLayer) -> bool:

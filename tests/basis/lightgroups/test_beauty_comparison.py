@@ -1,5 +1,6 @@
 """Which layer is the sum of others: as the plain definition says, at a pass over each."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -107,14 +108,21 @@ def test_every_layer_is_gone_through_a_few_times_however_many_there_are():
     assert 0 < _Counted.read < 12 * images.size
 
 
-def _lossy_layers(path: Path, compression: str, kind: Any, extra: float) -> dict[str, Any]:
-    """Layers with grain, and one light of a hundredth of the picture in a corner, in no group."""
+def _lossy_layers(
+    path: Path, compression: str, kind: Any, extra: float, *, is_even: bool = False
+) -> dict[str, Any]:
+    """Layers with grain, and one light of a hundredth of the picture in a corner, in no group.
+
+    is_even: whether it shines on all that the others do, in proportion, where it hides best.
+    """
     rng = np.random.default_rng(3)
     y, x = (side[..., None] for side in np.mgrid[:64, :96])
     smooth = [np.exp(np.sin(x / a) + np.cos(y / b)) for a, b in ((9, 14), (17, 8), (30, 30))]
     images = np.stack([s * rng.gamma(9, 1 / 9, (64, 96, 3)) for s in smooth]).astype(np.float32)
     corner = np.zeros_like(images[0])
     corner[:16, :16] = extra * images.sum() / (16 * 16 * 3)
+    if is_even:
+        corner = extra * images.sum(axis=0)
     layers = {"Combined": images.sum(axis=0) + corner}
     layers |= {f"Combined_{name}": image for name, image in zip("abc", images, strict=True)}
     header = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
@@ -139,11 +147,17 @@ def test_what_lossy_compression_changes_is_not_missing(tmp_path: Path, compressi
     assert groups.missing > 1e-4  # which without the loss would be a rest
     [remark] = [x for x in groups.remarks if "add up" in x]
     assert f"the lossy compression {compression}" in remark
+    [hidden] = re.findall(r"may hide a lamp of up to ([\d.]+) % of it", remark)
     # A light that is missing is missing.
     groups = read_light_groups(**_lossy_layers(tmp_path, compression, kind, extra=0.01))
     assert groups.has_rest
     [remark] = [x for x in groups.remarks if "lack" in x]
     assert f"some of it is the loss of the compression {compression}" in remark
+    # So is every one that is larger than what may be hidden, wherever it shines.
+    assert 0 < float(hidden) < 20
+    share = 1.02 * float(hidden) / 100  # of the beauty, of which two digits are shown
+    larger = _lossy_layers(tmp_path, compression, kind, extra=share / (1 - share), is_even=True)
+    assert read_light_groups(**larger).has_rest
 
 
 @pytest.mark.parametrize(
