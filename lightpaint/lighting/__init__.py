@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, diagnose, error_shares
     from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
+    from lightpaint.lighting.analysis.noise.noise_of_sums import covariance_of_sums
     from lightpaint.lighting.analysis.noise.sample_demand import (
         pixel_variances, sample_demand, top_up_counts,
     )

@@ -31,6 +31,12 @@ LEAST_OWN = 1e-3
 #: Noise of a pixel, as a share of ‖Ψ‖², above which the pixel tells nothing.
 NOISY = 1e-3
 
+#: Ridge of a matrix that is inverted for errors, relative to its diagonal.
+ERROR_RIDGE = 1e-6
+
+#: Largest share of a pixel's noise that a fit may take, for the noise of its residual.
+MAX_LEVERAGE = 0.8
+
 
 @dataclass(frozen=True)
 class Fitted:
@@ -93,6 +99,18 @@ class Ranking:
         )
 
 
+@dataclass(frozen=True)
+class PaintingScatter:
+    """The scatter of poses by the noise of paintings.
+
+    covariance: (q, q), of the numbers of poses. levels: (n, c), standard deviations of the weights
+    that follow the poses.
+    """
+
+    covariance: Doubles
+    levels: Doubles
+
+
 class PlacementFit:
     """Goals on a small film, and the columns of all lights at their current places.
 
@@ -104,11 +122,14 @@ class PlacementFit:
     error, whether it is bright or dark.
 
     columns: (n, 2 p, 3) at unit emission, images and then half differences, or images alone,
-    (n, p, 3); with panels among them (…, 4). goals: of each look.
+    (n, p, 3); with panels among them (…, 4). goals: of each look. sizes: of the film of each view,
+    for the noise of paintings; it is unknown without them.
     """
 
-    def __init__(self, columns: Floats, goals: Sequence[LookGoal]) -> None:
-        self.columns, self._looks = columns, balanced(goals)
+    def __init__(
+        self, columns: Floats, goals: Sequence[LookGoal], sizes: Sequence[tuple[int, int]] = ()
+    ) -> None:
+        self.columns, self._looks, self._sizes = columns, balanced(goals), tuple(sizes)
         importance = np.concatenate([look.importance for look in self._looks], axis=1)
         self._root = np.sqrt(importance.astype(np.float64))
         self._goal = np.concatenate([look.goal for look in self._looks], axis=1) * self._root
@@ -235,18 +256,11 @@ class PlacementFit:
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         columns = seen_columns(fitted.columns)
         for c in self.channels:
-            root = np.resize(self._root[:, c], len(residual))
-            weighted_slopes = root * picture_slopes(
-                fitted.columns, fitted.weights, slopes.values, slopes.owners, c
-            )
-            jacobian = np.zeros((count, len(residual)))
-            for number, row in zip(slopes.numbers, weighted_slopes, strict=True):
-                jacobian[number] += row
+            jacobian = self._jacobian(fitted, slopes, c)
+            _, active = self._active(columns, fitted.weights, c)
             gradient += jacobian @ residual[:, c]
             jacobian = jacobian[:, :p]
             matrix += jacobian @ jacobian.T
-            free = self._free(fitted.weights, c)
-            active = (columns[free, :, c % 3] * root).astype(np.float64)
             if len(active):
                 reached, active = active @ residual[:, c], active[:, :p]
                 cross = jacobian @ active.T
@@ -254,6 +268,77 @@ class PlacementFit:
                 matrix -= cross @ inverse @ cross.T
                 gradient -= cross @ (inverse @ reached)
         return matrix, gradient
+
+    def scatter_by_paintings(self, fitted: Fitted, slopes: Slopes) -> PaintingScatter:
+        """Return the scatter of poses and weights by the noise of paintings.
+
+        The noise τ moves the poses by H⁻¹ Σ s τ, with the Gauss-Newton matrix H and the slopes s of
+        the picture, less what weights make up for.
+        """
+        matrix, _ = self.newton(fitted, slopes)
+        ridge = np.diag(matrix) + ERROR_RIDGE * np.trace(matrix) + 1e-300
+        inverse = np.linalg.inv(matrix + ERROR_RIDGE * np.diag(ridge))
+        covariance, responses = np.zeros(matrix.shape), []
+        for k in range(len(self._looks)):
+            its = range(3 * k, 3 * k + 3)
+            parts = [self._slopes_beside_weights(fitted, slopes, c) for c in its]
+            rows = np.stack([part.rows for part in parts], axis=1)  # (q, 3, p)
+            taken = np.mean([part.leverage for part in parts], axis=0)
+            taken += np.einsum("qcp,qr,rcp->p", rows, inverse, rows, optimize=True)
+            # The residual of a pixel lacks what the fit took of its noise (MacKinnon and White
+            # 1985, HC3).
+            rows /= 1 - np.minimum(taken, MAX_LEVERAGE)
+            covariance += self._covariance_by_painting(fitted, rows, its)
+            responses += [part.response for part in parts]
+        covariance = inverse @ covariance @ inverse
+        variances = [np.einsum("iq,qr,ir->i", x, covariance, x) for x in responses]
+        return PaintingScatter(covariance, np.sqrt(np.maximum(variances, 0)).T)
+
+    def _covariance_by_painting(self, fitted: Fitted, rows: Doubles, its: range) -> Doubles:
+        """Return the covariance of sums over the noise of a painting, (q, q).
+
+        rows: (q, 3, p), their factors. its: the channels of the look.
+        """
+        residual = self._residual(fitted.columns, fitted.weights)[:, its]
+        noise = self._noise(fitted.columns, fitted.weights)[:, its]
+        noise, counted = np.resize(noise, residual.shape), self._root[:, its].any(axis=1)
+        covariance, end = np.zeros((len(rows), len(rows))), 0
+        for size in self._sizes:
+            view, end = slice(end, end + math.prod(size)), end + math.prod(size)
+            covariance += lighting.covariance_of_sums(
+                residual[view].T.reshape(3, *size),
+                noise[view].T.reshape(3, *size),
+                rows[..., view].reshape(len(rows), 3, *size),
+                counted[view].reshape(size),
+            )
+        return covariance
+
+    def _slopes_beside_weights(self, fitted: Fitted, slopes: Slopes, c: int) -> "_FreeSlopes":
+        """Return the slopes of the picture in a channel with the weights that follow."""
+        p = self.pixels
+        jacobian = self._jacobian(fitted, slopes, c)[:, :p]
+        free, active = self._active(seen_columns(fitted.columns)[:, :p], fitted.weights, c)
+        inverse = np.linalg.pinv(active @ active.T, rcond=1e-9, hermitian=True)
+        response = np.zeros((len(free), len(jacobian)))
+        response[free] = -inverse @ (active @ jacobian.T)
+        leverage = np.einsum("ip,ij,jp->p", active, inverse, active, optimize=True)
+        return _FreeSlopes(jacobian + response[free].T @ active, response, leverage)
+
+    def _jacobian(self, fitted: Fitted, slopes: Slopes, c: int) -> Doubles:
+        """Return weighted slopes of the picture in a channel by numbers of poses, (count, q)."""
+        own = picture_slopes(fitted.columns, fitted.weights, slopes.values, slopes.owners, c)
+        root = np.resize(self._root[:, c], own.shape[1])
+        jacobian = np.zeros((max(slopes.numbers) + 1, own.shape[1]))
+        for number, row in zip(slopes.numbers, root * own, strict=True):
+            jacobian[number] += row
+        return jacobian
+
+    def _active(self, columns: Floats, weights: Doubles, c: int) -> tuple[Bools, Doubles]:
+        """Return which lights shine in a channel and may change, (n,), and their weighted columns,
+        (free lights, q). columns: (n, q, 3), as seen.
+        """
+        free, root = self._free(weights, c), np.resize(self._root[:, c], columns.shape[1])
+        return free, np.asarray(columns[free, :, c % 3] * root, np.float64)
 
     def _free(self, weights: Doubles, c: int) -> Bools:
         """Return which lights shine in a channel and may change, (n,)."""
@@ -279,6 +364,19 @@ class PlacementFit:
                 equations.target_norm2 - np.square(goal).sum(axis=0),
             )
         return equations if pull is None else equations + pull
+
+
+@dataclass(frozen=True)
+class _FreeSlopes:
+    """Slopes of the picture in a channel by numbers of poses, with the weights that follow.
+
+    rows: (q, p), weighted. response: (n, q), slopes of the weights. leverage: (p,), the share of
+    the noise of each pixel that weights take.
+    """
+
+    rows: Doubles
+    response: Doubles
+    leverage: Doubles
 
 
 def _products(images: Floats | Doubles) -> Doubles:
@@ -316,7 +414,7 @@ def fit_of(
         current = np.pad(current, ((0, 0), (0, 0), (0, 1)))
     black = np.zeros((len(new), *current.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
-    return PlacementFit(np.concatenate([current, black]), goals)
+    return PlacementFit(np.concatenate([current, black]), goals, sizes)
 
 
 def _on_films(planes: Sequence[Planes], sizes: Sequence[tuple[int, int]]) -> Iterator[Floats]:

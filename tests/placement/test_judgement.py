@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
@@ -124,3 +125,49 @@ def test_errors_of_poses_and_levels_know_the_noise_of_lights_that_stay() -> None
     for stated, true in ((place_errors, np.var(places, ddof=1)), (level_errors, by_poses)):
         ratio = np.mean(np.square(stated / FEW_FITS)) / true
         assert abs(np.log(ratio)) < tolerance
+
+
+#: A film of few pixels, and the deviation of the noise of a painting relative to its light.
+FILM, GRAIN = (24, 36), 0.1
+
+
+class FilmPaths:
+    """A narrow pool of light around the x and y of a light, without noise."""
+
+    def columns(self, sites: Sequence[Site]) -> Floats:
+        y, x = np.mgrid[-1 : 1 : FILM[0] * 1j, -1.5 : 1.5 : FILM[1] * 1j]
+        places = [site.position or (0, 0, 0) for site in sites]
+        pools = [np.exp(-8 * ((x - at) ** 2 + (y - up) ** 2)).ravel() for at, up, _ in places]
+        images = 0.02 + np.array(pools)[..., None] * np.ones(3)
+        return np.concatenate([images, 0 * images], axis=1).astype(np.float32)
+
+
+@pytest.mark.parametrize("share", [1.0, nightly(0.1)])
+def test_errors_of_poses_know_the_noise_of_the_painting(share: float) -> None:
+    """As that of a render, which is strongest in the pool that tells where the light is."""
+    start, film = Site((0.0, 0.0, 0.0)), FilmPaths()
+    line: Any = film
+    paths: Any = SimpleNamespace(refine=film, judge=film, spread=film)
+    pixels = FILM[0] * FILM[1]
+    goal = film.columns([start])[0, :pixels].astype(float)
+    reduction = Reduction(np.zeros((1, 3)), ("pool",), (Knob.of_any_colour(0),))
+    freedom = lp.Freedom(box=((-1.0, -1.0, 0.0), (1.0, 1.0, 0.0)))
+    movables = (Movable(FreeLight("pool", start, freedom), (0,), None, None),)
+    seeds, rows = 12, []
+    for seed in range(seeds):
+        noise = np.random.default_rng(seed).normal(size=(pixels, 1))
+        look = LookGoal(
+            goal * (1 + share * GRAIN * noise), np.ones_like(goal), reduction, None, 0 * goal
+        )
+        fit = PlacementFit(np.zeros((1, 2 * pixels, 3), np.float32), [look], [FILM])
+        steps = PoseSteps(fit, 1.0, lambda *_: True)
+        before = Arrangement(movables, (start,), steps.fitted(movables, (start,), line))
+        best = steps.descend(before, line, 4)
+        errors = PlacementJudge(fit, steps, paths).errors(best)
+        x, y, _ = best.sites[0].position or (0, 0, 0)
+        rows.append((x, y, errors.poses[0].place))
+    x, y, place_errors = np.array(rows).T
+    scatter = np.var(x, ddof=1) + np.var(y, ddof=1)
+    # `seeds` numbers for each of two coordinates, and as many error bars of ten pixels or so.
+    tolerance = 4 * np.sqrt(2 / (2 * seeds) + 2 / (10 * seeds))
+    assert abs(np.log(np.mean(np.square(place_errors)) / scatter)) < tolerance

@@ -54,6 +54,31 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize("spp", [64, 512])
+def test_the_error_of_a_place_is_its_scatter_over_paintings(tmp_path: Path, spp: int) -> None:
+    """Over renders that are paintings, bases and paths, each with another seed."""
+    path = write_room(tmp_path)
+    film = '<integer name="height" value="60"/><rfilter type="box"/>'
+    text = path.read_text().replace('value="24"', 'value="80"')
+    path.write_text(text.replace('<integer name="height" value="20"/>', film))
+    room, seeds, rows = load_scene(path), 8, []
+    painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})
+    for seed in range(seeds):
+        basis = lp.render_basis(room, spp=128, seed=seed)
+        goal = lp.render_basis(painted, spp=spp, seed=seeds + seed).current_look
+        solution = lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
+        freedom = {"bulb": lp.Freedom(within=1.5)}
+        [move] = lp.place(room, basis, solution, freedom, seed=seed).moves
+        rows.append((*(move.new.position or ()), move.place_error))
+    x, y, z, errors = np.array(rows, dtype=float).T
+    scatter = sum(np.var(its, ddof=1) for its in (x, y, z))
+    # The standard error of `seeds` places along the two axes that are told least, and of as many
+    # error bars, which few pixels of a highlight and few fits tell.
+    tolerance = 4 * np.sqrt(2 / (2 * (seeds - 1)) + 2 / (10 * seeds))
+    assert abs(np.log(np.mean(np.square(errors)) / scatter)) < tolerance
+
+
+@pytest.mark.nightly
 def test_a_search_that_is_enough_ends_with_the_best_so_far(room: Scene) -> None:
     """After a few trials of the first light, which nothing but those has come nearer by."""
     painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})

@@ -237,19 +237,25 @@ class PlacementJudge:
 
         All fits share the basis, whose noise moves poses, too. So two fits more take one half of
         the basis's samples each. They differ from the first by d and -d, the effect of the half
-        difference; the variance is d².
+        difference; the variance is d². All share the painting, too, whose noise moves poses by what
+        derivatives say.
         """
         fits: list[Sequence[Site]] = [best.sites]
         for sign, other in ((1, self._paths.judge), (-1, self._paths.spread)):
             steps = self._steps.with_fit(self._fit.of_half(sign))
             fits.append(steps.refit(best, self._paths.refine, other))
+        ends, by_paintings = self._steps.scatter_by_paintings(best, self._paths.refine)
         poses = [
-            _error([sites[k] for sites in fits], best.movables[k].light.freedom.slides)
+            _error(
+                [sites[k] for sites in fits],
+                [(above[k], below[k]) for above, below in ends],
+                best.movables[k].light.freedom.slides,
+            )
             for k in range(len(best.movables))
         ]
         # The same paths and samples at all poses: what levels do by the poses alone.
         levels = [self._steps.fitted(best.movables, x, self._paths.refine).weights for x in fits]
-        return ArrangementError(poses, _level_errors(np.array(levels)))
+        return ArrangementError(poses, _level_errors(np.array(levels), by_paintings))
 
     def growth(self, best: Arrangement, order: Sequence[int]) -> list[Growth]:
         """Return the best lighting with none of the new lights, with the first, and so on.
@@ -287,28 +293,42 @@ class PlacementJudge:
         return Arrangement(tuple(movables), tuple(sites), fitted)
 
 
-def _level_errors(weights: Doubles) -> Doubles:
-    """Return relative deviations of levels, (n, 3). weights: (fits, n, channels of all looks)."""
+def _level_errors(weights: Doubles, by_paintings: Doubles) -> Doubles:
+    """Return relative deviations of levels, (n, 3).
+
+    weights: (fits, n, channels of all looks). by_paintings: (n, channels), independent deviations.
+    """
     mean, spread = weights.mean(axis=0), FEW_FITS * weights.std(axis=0, ddof=1)
-    relative = np.divide(spread, mean, out=np.zeros_like(mean), where=mean > 0)
+    deviation = np.hypot(spread, by_paintings)
+    relative = np.divide(deviation, mean, out=np.zeros_like(mean), where=mean > 0)
     looks = relative.reshape(len(mean), -1, 3)
     return np.asarray(np.sqrt(np.square(looks).mean(axis=1)))
 
 
-def _error(sites: Sequence[Site], slides: bool) -> PoseError:
-    """Return the spread of the poses of one light in several fits."""
+def _error(sites: Sequence[Site], ends: Sequence[tuple[Site, Site]], slides: bool) -> PoseError:
+    """Return the spread of the poses of one light in several fits, and between the ends of its
+    scatter by paintings.
+    """
     place = turn = None
     if slides and sites[0].position is not None:
         places = np.array([site.position for site in sites], dtype=float)
         squares = np.square(places - places.mean(axis=0)).sum() / (len(sites) - 1)
-        place = FEW_FITS * math.sqrt(float(squares))
+        sides = np.array([[x.position for x in pair] for pair in ends], dtype=float)
+        by_paintings = np.square(sides[:, 0] - sides[:, 1]).sum() / 4 if ends else 0.0
+        place = math.sqrt(FEW_FITS**2 * float(squares) + float(by_paintings))
     if sites[0].direction is not None:
         axes = np.array([site.direction for site in sites], dtype=float)
         mean = axes.mean(axis=0) / max(float(np.linalg.norm(axes.mean(axis=0))), 1e-12)
-        angles = np.arccos(np.clip(axes @ mean, -1, 1))
-        squares = np.square(angles).sum() / (len(sites) - 1)
-        turn = FEW_FITS * math.degrees(math.sqrt(float(squares)))
+        squares = np.square(_angles(axes, mean)).sum() / (len(sites) - 1)
+        sides = np.array([[x.direction for x in pair] for pair in ends], dtype=float)
+        by_paintings = np.square(_angles(*np.moveaxis(sides, 1, 0)) / 2).sum() if ends else 0.0
+        turn = math.degrees(math.sqrt(FEW_FITS**2 * float(squares) + float(by_paintings)))
     return PoseError(place, turn)
+
+
+def _angles(axes: Doubles, others: Doubles) -> Doubles:
+    """Return the angles between directions, (k, 3), and others or another, (k,) radians."""
+    return np.asarray(np.arccos(np.clip((axes * others).sum(axis=-1), -1, 1)))
 
 
 def standard_error(differences: Doubles) -> float:

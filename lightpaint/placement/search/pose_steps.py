@@ -220,6 +220,29 @@ class PoseSteps:
             sites = stepped
         return sites
 
+    def scatter_by_paintings(
+        self, arrangement: Arrangement, at: ViewPaths
+    ) -> tuple[list[tuple[list[Site], list[Site]]], Doubles]:
+        """Return poses on both sides, by one standard deviation along each axis of the scatter of
+        poses by the noise of paintings; and standard deviations of the weights that follow, (n, c).
+        """
+        scales = self._all_scales(arrangement, None)
+        if not any(len(scale) for scale in scales.values()):
+            return [], np.zeros(arrangement.fitted.weights.shape)
+        slopes = self._slopes(arrangement, at, scales, LAST_SHARE * self.first_step)
+        scatter = self._fit.scatter_by_paintings(arrangement.fitted, slopes)
+        variances, axes = np.linalg.eigh(scatter.covariance)
+        largest = REFIT_STEP * self.first_step
+        ends = []
+        for axis in (axes * np.sqrt(np.maximum(variances, 0))).T:
+            change = np.clip(axis, -largest, largest)
+            above, below = (
+                self._stepped(arrangement, arrangement.sites, sign * change, scales)
+                for sign in (1, -1)
+            )
+            ends.append((above, below))
+        return ends, scatter.levels
+
     def _stepped(
         self,
         arrangement: Arrangement,

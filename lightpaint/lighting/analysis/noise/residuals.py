@@ -126,15 +126,9 @@ def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
     """Return the variance that N measures with taps `step` pixels apart, (h, w)."""
     if min(counted.shape) <= 2 * step:
         return np.zeros(counted.shape)
-    a, whole = residual.astype(np.float64), counted
-    for axis in (0, 1):
-        first, middle, last = _taps(a, step, axis)
-        a = first - 2 * middle
-        a += last
-        whole = np.logical_and.reduce(_taps(whole, step, axis))
-    a *= whole
+    a, whole = second_difference(residual, counted, step)
     products = np.square(a)
-    for window, shifted in _distant_windows(3 * step):
+    for window, shifted in distant_windows(3 * step):
         pairs = a[window] * a[shifted]
         pairs /= 2
         products[window] -= pairs
@@ -148,6 +142,22 @@ def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
     return np.pad(variance, step, mode="edge")
 
 
+def second_difference(residual: Floats, counted: Bools, step: int) -> tuple[Doubles, Bools]:
+    """Return a = N r with taps `step` pixels apart, 0 where one does not count, and where all do.
+
+    residual, counted: (h, w), of more than 2 `step` pixels along each side. Both results are
+    without `step` pixels at each border.
+    """
+    a, whole = residual.astype(np.float64), counted
+    for axis in (0, 1):
+        first, middle, last = _taps(a, step, axis)
+        a = first - 2 * middle
+        a += last
+        whole = np.logical_and.reduce(_taps(whole, step, axis))
+    a *= whole
+    return a, whole
+
+
 def _taps(image: npt.NDArray[_Kind], step: int, axis: int) -> list[npt.NDArray[_Kind]]:
     """Return `image` three times, `step` pixels apart along an axis."""
     lines = np.moveaxis(image, axis, 0)
@@ -155,7 +165,7 @@ def _taps(image: npt.NDArray[_Kind], step: int, axis: int) -> list[npt.NDArray[_
     return [np.moveaxis(lines[k * step :][:length], 0, axis) for k in range(3)]
 
 
-def _distant_windows(distance: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+def distant_windows(distance: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
     """Yield windows at this distance from each other: across, down and along both diagonals."""
     first, last, whole = slice(None, -distance), slice(distance, None), slice(None)
     yield (whole, first), (whole, last)
