@@ -13,7 +13,7 @@ if TYPE_CHECKING:
         check_size, render_basis, train_guide, training_samples, with_first_hits,
     )
     from lightpaint.basis.render.integrators import (
-        check_renders_spectra, remark_on_separate_renders, why_not_one_pass,
+        check_renders_spectra, remark_on_fog, remark_on_separate_renders, why_not_one_pass,
     )
     from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
     from lightpaint.basis.render.render_budget import check_samples

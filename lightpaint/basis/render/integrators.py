@@ -4,7 +4,9 @@ It traces the paths of `path`. Some other integrators estimate the same picture 
 their basis is then the same up to noise.
 """
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
+from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.scene import ENVIRONMENTS, Integrator, Scene
 from lightpaint.scene.runtime.variant import FAST_VARIANT, use_variant
 from lightpaint.sentences import Hint, Word
@@ -15,6 +17,8 @@ DIRECT = ("direct", "direct_projective")
 ON_SURFACES = ("path", "prb", "prb_projective", *DIRECT)
 #: Size of the planes of all lights in float32, in bytes, up to which indirect light is split off.
 SPLIT_MAX_BYTES = 2**29
+#: Emitters at a point.
+WITHOUT_SIZE = ("point", "spot", "projector", POINT_PLUGIN)
 #: Integrators that hide emitters from the camera in another way than `path`.
 HIDING_OTHERWISE = ("volpath", "prb_projective", "direct_projective")
 
@@ -104,3 +108,25 @@ def needs_a_bounce(scene: Scene) -> bool:
     sees_backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
     is_hidden = scene.integrator.hide_emitters or not sees_backdrop
     return scene.integrator.plugin == "path" and scene.has_null and is_hidden
+
+
+def remark_on_fog(scene: Scene) -> str | None:
+    """Return a remark on lights without a size in fog; None without either.
+
+    Light that scatters at a distance d from such a light has the factor 1/d². Free paths are
+    sampled without regard to it, and the variance, of ∫ d⁻⁴ dV, has no bound: a basis that has not
+    met a path close to the light does not know of it.
+    """
+    names = [
+        light.name
+        for light in scene.lights
+        if any(member.plugin in WITHOUT_SIZE for member in light.members)
+    ]
+    if not names or not scene.has_media or scene.integrator.plugin in ON_SURFACES:
+        return None
+    is_one = len(names) == 1
+    return (
+        f"{some_names(names)} {'has' if is_one else 'have'} no size: light that scatters in fog "
+        f"close to {'it' if is_one else 'them'} comes by rare bright paths, so that "
+        f"{'its' if is_one else 'their'} ± may be too small; small balls of light have none of them"
+    )

@@ -247,6 +247,8 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
             f"{some_names(metals)}: eta and k in RGB, which Mitsuba's spectral variants show too "
             "dark; give the metal by its name (material) or by spectra"
         )
+    if is_rendered and (fog := render.remark_on_fog(scene)) is not None:
+        remarks.append(fog)
     # Python code gets the same text as a warning.
     note = use_variant().note
     if not note and is_rendered:

@@ -294,6 +294,26 @@ def test_what_one_pass_cannot_serve_is_rendered_separately(
     assert (basis.images.reshape(len(basis.lights), -1).sum(axis=1) > 0).all()
 
 
+#: A box of fog around the room, and a bulb of the light of `bulb` that has a size.
+FOG = """<shape type="cube"><transform name="to_world"><scale x="2" y="2" z="2"/></transform>
+    <bsdf type="null"/><medium type="homogeneous" name="interior"><rgb name="sigma_t" value="0.3"/>
+    <rgb name="albedo" value="0.8"/></medium></shape>"""
+BALL = """<shape type="sphere" id="bulb"><point name="center" x="-0.5" y="1" z="0.5"/>
+    <float name="radius" value="0.05"/><emitter type="area"><rgb name="radiance" value="60"/>
+    </emitter></shape>"""
+
+
+@pytest.mark.parametrize("has_size", [False, True])
+def test_fog_around_a_light_without_a_size_is_remarked(tmp_path: Path, has_size: bool) -> None:
+    """One path that scatters beside it may have most of the energy of its image."""
+    lights = FOG + (BALL if has_size else LIGHTS["bulb"])
+    scene = load_scene(write_room(tmp_path, integrator=_integrator("volpath"), lights=lights))
+    told = [x for x in map(str, remarks_of_scene(scene)) if x.startswith("bulb has no size")]
+    assert len(told) == (not has_size)
+    plain = load_scene(write_room(tmp_path, integrator=_integrator("path"), lights=lights))
+    assert not any("no size" in str(x) for x in remarks_of_scene(plain))  # it shows no fog
+
+
 @pytest.mark.parametrize("option", ["emitter_samples", "bsdf_samples", "shading_samples"])
 def test_direct_with_other_sample_counts_is_not_one_path(tmp_path: Path, option: str) -> None:
     integrator = f'<integrator type="direct"><integer name="{option}" value="2"/></integrator>'
