@@ -100,7 +100,7 @@ def test_intervals_hold_the_answer_without_noise(
     assert 0.6 < ratio < 1.4
 
 
-def _factor(values: Any, half: Any, own: float = 0.5) -> Any:
+def _factor(values: Any, half: Any, own: float = 0.0) -> Any:
     """A share of each pixel and the rest of the other one of its pair, where they are alike.
 
     values, half: (…, pixels, channels). The last of an odd number takes the pixel before it.
@@ -111,7 +111,7 @@ def _factor(values: Any, half: Any, own: float = 0.5) -> Any:
     return np.where(is_alike, own * values + (1 - own) * beside, values)
 
 
-def _push(images: Any, halves: Any, residual: Any, noise: Any, own: float = 0.5) -> Any:
+def _push(images: Any, halves: Any, residual: Any, noise: Any, own: float = 0.0) -> Any:
     """The noise of the gradient by hand, (n, pixels, channels), of arrays (…, pixels, channels)."""
     return halves * _factor(residual, noise, own) - _factor(images, halves, own) * noise
 
@@ -142,6 +142,23 @@ def test_one_light_by_hand(make_basis: Any):
     np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
 
 
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+def test_an_interval_has_95_percent_around_the_answer_without_bias(make_basis: Any, sigma: float):
+    """And includes the answer, however far bias has moved it."""
+    rng = np.random.default_rng(1)
+    image = 1 + rng.random((1, *SIZE, 3))
+    half = rng.normal(0, sigma, image.shape)
+    basis = make_basis(images=image, half_differences=half)
+    solution = solve(basis, _target(1.4 * image[0]), literal=True)
+    bars = error_bars(solution, with_painting=False)
+    center = bars.weights + bars.bias
+    below, above = ((end - center)[0] / bars.scatter[0] for end in bars.interval)
+    mass = scipy.special.ndtr(above) - scipy.special.ndtr(below)
+    # Student's t of so few pixels is wider by half a percent.
+    np.testing.assert_allclose(mass, 0.95, atol=4e-3)
+    assert (below <= -bars.bias[0] / bars.scatter[0] + 1e-9).all()
+
+
 def test_errors_of_poses_add_to_the_scatter(make_basis: Any):
     """Independent of the basis's noise: the squares add up, in intervals, too."""
     clean = _pools()
@@ -156,8 +173,9 @@ def test_errors_of_poses_add_to_the_scatter(make_basis: Any):
     (low, _), (both_low, _) = alone.interval, both.interval
     np.testing.assert_array_equal(both_low[1:], low[1:])
     inside = both_low[0] > 0
-    rise = np.hypot((solution.weights - low)[0], NORMAL_95 * by_poses[0])
-    np.testing.assert_allclose((solution.weights - both_low)[0][inside], rise[inside], rtol=1e-9)
+    unbiased = (solution.weights + alone.bias)[0]
+    rise = np.hypot(unbiased - low[0], NORMAL_95 * by_poses[0])
+    np.testing.assert_allclose((unbiased - both_low[0])[inside], rise[inside], rtol=1e-9)
     assert inside.any()
 
 

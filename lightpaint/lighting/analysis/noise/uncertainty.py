@@ -43,7 +43,11 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
 )
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.painting_noise import CORRELATION, PaintingNoise
-from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
+from lightpaint.lighting.analysis.noise.weight_directions import (
+    NORMAL,
+    WeightResponse,
+    solve_for,
+)
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -69,6 +73,13 @@ SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
 
 #: Changes of an inverse that are collected: one by one each takes a walk over the matrix.
 COLUMNS_AT_A_TIME = 32
+
+#: Standard deviations to the end of one side of a 95 % interval, and of its other side.
+FAR_SIDES = np.linspace(NORMAL_95, 6, 50)
+NEAR_SIDES = [
+    NORMAL.inv_cdf(NORMAL.cdf(NORMAL_95) - (NORMAL.cdf(-NORMAL_95) - NORMAL.cdf(-x)))
+    for x in FAR_SIDES
+]
 
 #: The least share of a light within what M determines, if no other lights replace it exactly.
 OWN = 1 - 1e-6
@@ -292,7 +303,7 @@ def error_bars(
     problem, weights = solution.problem, solution.weights
     if not problem.basis.knows_noise:
         return None
-    noise = noise_sums(solution)
+    noise = noise_sums(solution, removed=1.0)
     if len(weights) > FEW_LIGHTS:
         release_freed_memory()
     step = _GradientStep.of(solution, noise)
@@ -412,15 +423,29 @@ def _root(*parts: Doubles) -> Doubles:
 def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
     """Return lower and upper ends, (n, 3) each, within the constraints.
 
-    sides: standard deviations below and above, wider where few pixels tell them.
+    They lie around the weights without bias, and include the weights as solved. sides: standard
+    deviations below and above, wider where few pixels tell them.
     """
-    weights = solution.weights
+    weights, center = solution.weights, solution.weights + bias
     low, high = solution.problem.local_reduction.weight_ranges
-    below, above = (NORMAL_95 * np.hypot(side, bias) for side in sides)
+    below, above = sides
+    lower = center - _reach(-bias, above) * below
+    upper = center + _reach(bias, below) * above
     return (
-        np.minimum(np.maximum(weights - below, low), weights),
-        np.maximum(np.minimum(weights + above, high), weights),
+        np.minimum(np.maximum(lower, low), weights),
+        np.maximum(np.minimum(upper, high), weights),
     )
+
+
+def _reach(beyond: Doubles, deviation: Doubles) -> Doubles:
+    """Return the standard deviations that an interval of 95 % reaches on one side.
+
+    beyond: distance to the value that it has to include on its other side; deviation: the standard
+    deviation there. Where that is t of these away, and t is more than 1.96, this side ends where Φ
+    is .95 + Φ(−t).
+    """
+    far = np.divide(beyond, deviation, out=np.zeros_like(deviation), where=deviation > 0)
+    return np.interp(far, FAR_SIDES, NEAR_SIDES)
 
 
 def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
