@@ -11,6 +11,7 @@ from typing import Any
 from lightpaint.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.held_answer import hold_to_current
+from lightpaint.lighting.analysis.noise.painting_filter import answer_without_filter
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
@@ -77,8 +78,9 @@ def solve(
 def default_answer(
     problem: Problem, finish: Callable[[Solution], Solution] = lambda x: x
 ) -> Solution:
-    """Solve a problem, and hold the answer to the current lights where changes bring nothing.
+    """Solve a problem, take the filter out of a painting that is a render, and hold the answer to
+    the current lights where changes bring nothing.
 
     finish: what is done to each answer once it is solved, as the correction of its noise.
     """
-    return hold_to_current(finish(solution_of(problem)), finish)
+    return hold_to_current(answer_without_filter(finish(solution_of(problem)), finish), finish)

@@ -132,6 +132,8 @@ class Problem(linear_problem.LinearProblem):
         tether: A further pull on the weights, to those at other frames of a shot; None without.
         holding: The pull to the current lights that holds an answer which would lead away from the
             paint; None without.
+        filter_share: The share of a Gaussian reconstruction filter whose effect was taken out of
+            the paintings, which are renders; 0 without one.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)
@@ -158,6 +160,7 @@ class Problem(linear_problem.LinearProblem):
     block_side: int = 1
     tether: NormalEquations | None = None
     holding: NormalEquations | None = None
+    filter_share: float = 0.0
 
     __repr__ = short_repr
 
@@ -189,14 +192,7 @@ class Problem(linear_problem.LinearProblem):
         all_constraints = with_scale(all_constraints, bases[0].lights)
         whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
-        squares = painting.joint_squares(views, unpainted=painting.unpainted_weight_of(views, fit))
-        loss = painting.choose_loss(
-            squares,
-            painting.at_least_mask(views),
-            fit.transform,
-            painted=lambda: painting.target_light(views),
-            current=lambda: whole.current_look,
-        )
+        squares, loss = _losses(views, whole, fit)
         reference = start_weights(all_constraints.start, whole.lights)
         reading = ViewsReading(views, whole.power, reference, fit)
         terms = reading.terms()
@@ -293,6 +289,17 @@ class Problem(linear_problem.LinearProblem):
             return self.equations.objective(weights)
         return LitPixels.whole(self.basis, self.loss).objective(weights)
 
+    def with_paintings(self, images: Sequence[Floats]) -> "Problem":
+        """Return the problem of the same demands with other paintings of light, before a solve.
+
+        images: (h, w, 3) of each view.
+        """
+        targets = zip(self.views.targets, images, strict=True)
+        views = Views(self.views.bases, tuple(replace(x, image=image) for x, image in targets))
+        squares, loss = _losses(views, self.basis, self.fit)
+        equations = NormalEquations.of(self.basis, squares.image, squares.weight)
+        return replace(self, views=views, squares=squares, loss=loss, equations=equations)
+
     def view_problem(self, k: int) -> "Problem":
         """Return the problem of view k alone: its pixels of the same squares."""
         if len(self.views) == 1:
@@ -311,6 +318,19 @@ class Problem(linear_problem.LinearProblem):
             equations=NormalEquations.of(basis, squares.image, squares.weight),
             corrected=None,
         )
+
+
+def _losses(views: Views, whole: Basis, fit: Fit) -> tuple[Squares, Loss]:
+    """Return the literal squares of the paintings, and the loss of a picture."""
+    squares = painting.joint_squares(views, unpainted=painting.unpainted_weight_of(views, fit))
+    loss = painting.choose_loss(
+        squares,
+        painting.at_least_mask(views),
+        fit.transform,
+        painted=lambda: painting.target_light(views),
+        current=lambda: whole.current_look,
+    )
+    return squares, loss
 
 
 def _resolve_views(

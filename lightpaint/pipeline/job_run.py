@@ -20,6 +20,7 @@ from lightpaint.lighting import (
     Solution,
     SurfaceColor,
     analyse,
+    answer_without_filter,
     choose_mixes,
     default_answer,
     hold_to_current,
@@ -183,6 +184,7 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     )
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
         solution = job_bases.without_noise(job, solution)
+    solution = _without_filter(job, solution, listen)
     held = hold_to_current(solution, partial(job_bases.without_noise, job))
     if held is not solution:
         listen.say(
@@ -201,6 +203,18 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     solution = choose_mixes(solution)
     lighting = result_folder.with_places(solution.lighting, job.views[0].scene)
     return replace(solution, lighting=lighting)
+
+
+def _without_filter(job: Job, solution: Solution, listen: Listener) -> Solution:
+    """Return the answer to paintings without the filter of a render, and say where it had one."""
+    with stage("filter of the painting", listen):
+        found = answer_without_filter(solution, partial(job_bases.without_noise, job))
+    if found is not solution:
+        listen.say(
+            "the painting seems to be rendered with a wider reconstruction filter than a box: "
+            "the answer allows for its softer edges and halos"
+        )
+    return found
 
 
 def _animated_answer(job: Job, bases: list[Basis], listen: Listener) -> JobAnswer:

@@ -1,24 +1,13 @@
-"""Errors of weights by a painting that is a render: by its noise, and by its filter.
+"""Errors of weights by the noise of a painting that is a render.
 
-A render has noise τ, which makes δg = Σ D Φ τ. Its variance is the variance of the residual from
-pixel to pixel, less the variance of the prediction (residuals.py).
-
-A basis has a box filter; Mitsuba's default is a Gaussian. It makes halos around lamps in view and
-softens all edges of light: it adds h = (F − 1) p to the prediction p = Σ w Φ. No lights make that,
-but each takes a part of it for its own light. So with
-
-    a = Σ D (Φ h − Φ′ h′),  δ = M⁻¹ a
-
-lights of a painting Ψ = p + α h are off by α δ. Least squares beside all lights give
-
-    α = Σ D (h r − h′ r′) / (Σ D (h² − h′²) − a · δ).
-
-Both h and the residual r = Ψ − p have the noise of the prediction; products of half differences,
-with a prime, take it out. A brush, too, may leave residuals that resemble h, but h explains only a
-small part of them.
+A render has noise τ, which makes δg = Σ D Φ τ. Its amount is the variance of the residual from
+pixel to pixel, less the variance of the prediction (residuals.py): its *grain*. A brush leaves
+residuals with hardly any grain. Where most of the squared residual is grain, relative to the light,
+all of it is noise. Renders are noisier where they are bright, so then the variance of a pixel is
+its own squared residual (White 1980), over (1 − ℓ)² with its leverage ℓ = D Φᵀ M⁻¹ Φ (MacKinnon and
+White 1985).
 """
 
-import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -26,44 +15,40 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis import as_slice, block_of
-from lightpaint.lighting.analysis.noise.basis_noise import couples_channels
-from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
-from lightpaint.lighting.analysis.noise.weight_directions import solve_for
-from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.images import box_mean
+from lightpaint.lighting.analysis.noise.basis_noise import (
+    couples_channels,
+    pseudo_inverse,
+)
+from lightpaint.lighting.analysis.noise.residuals import WINDOW, Residuals, channel_grain
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
 
 #: Least noise of a painting that counts, relative to the noise of the prediction.
 MIN_PAINTING_NOISE = 0.02
 
-#: Share of Mitsuba's Gaussian, whose standard deviation is half a pixel, that lies in each of both
-#: neighbours along an axis: beyond one standard deviation.
-TAP = (1 - math.erf(math.sqrt(0.5))) / 2
-
 #: Variance of a sum of pixels of a Gaussian filter over the sum of their variances. A sample counts
 #: in several, so the noise of neighbours has a correlation of .31 along an axis.
 CORRELATION = (1 + 2 * 0.31) ** 2
 
-#: Least share of the residual beside noise that the filter of a render explains.
-MIN_EXPLAINED = 0.5
+#: Shares of grain in the squared residual, relative to the light, from and to which a painting
+#: counts as a render: paint in 8 bits has up to .3.
+RENDERED = 0.25, 0.5
 
-#: Standard errors beyond which noise does not make Σ D h r.
-SURE = 4.0
+#: Largest share of a pixel in its own prediction by the fit.
+MAX_LEVERAGE = 0.75
 
-#: Largest α of a filter. Flat paint over a texture lacks more of it than any filter takes: α is 1.6
-#: and more.
-MAX_SHARE = 1.3
-
-#: Least part of ‖h‖² that no lights make.
-MIN_OWN = 0.05
+#: Light below which a residual is not relative to it, as a share of its mean.
+DARK = 0.01
 
 
 @dataclass(frozen=True)
 class PaintingNoise:
-    """The noise of a painting, and what its filter may have changed.
+    """The noise of a painting.
 
     D: (p, 3), weights of pixels. residuals: r and the half differences of the prediction. painted:
-    the pixels that count. variance: (p, 3), of τ, times D.
+    the pixels that count. variance: (p, 3), of τ, times D. is_render: whether pixels have
+    variances of their own.
     """
 
     solution: Solution
@@ -71,117 +56,91 @@ class PaintingNoise:
     residuals: Residuals
     painted: Indices
     variance: Doubles
+    is_render: bool
 
     @classmethod
     def of(cls, solution: Solution) -> Self:
         """Measure the noise of an answer's painting."""
         weight, residuals = solution.problem.squares.weight, Residuals.of(solution)
-        D = weight.reshape(-1, weight.shape[2]).astype(np.float64)
-        size, counted = solution.basis.size, solution.importance > 0
-        everything = slice(0, len(D))
-        residual, mixed = residuals.residual(everything), residuals.noise(everything)
-        D = np.broadcast_to(D, residual.shape)
-        variance = np.zeros(residual.shape)
-        for c in range(3):
-            of_both, of_prediction = (
-                channel_grain((np.sqrt(D[:, c]) * x[:, c]).reshape(size), counted).ravel()
-                for x in (residual, mixed)
-            )
-            variance[:, c] = np.maximum(of_both - of_prediction, 0)
-        return cls(solution, D, residuals, np.flatnonzero(counted), variance)
+        counted, everything = solution.importance > 0, slice(None)
+        r, r_half = residuals.residual(everything), residuals.noise(everything)
+        D = np.broadcast_to(weight.reshape(len(r), -1).astype(np.float64), r.shape)
+        variance = painting_grain(solution, D, r, r_half)
+        share = _rendered_share(solution, residuals.predicted, r, r_half)
+        if share:
+            variance = (1 - share) * variance + share * _own_variance(solution, D, r, r_half)
+        return cls(solution, D, residuals, np.flatnonzero(counted), variance, share > 0)
 
-    def covariance(self) -> Doubles | None:
-        """Return the covariance of the gradient by this noise, (3, n, 3, n); None where there is
-        next to none.
+    def covariance(self) -> tuple[Doubles, Doubles] | None:
+        """Return the covariance of the gradient by this noise, (3, n, 3, n), and its degrees of
+        freedom for each light, (n, 3), NaN if these are many; None where there is next to none.
         """
         roots = np.sqrt(self.D * self.variance)
         noise = self.residuals.noise(slice(0, len(roots)))
         if np.square(roots).sum() <= MIN_PAINTING_NOISE * (self.D * np.square(noise)).sum():
             return None
         n, planes = len(self.solution.weights), self.solution.basis.planes
-        covariance = np.zeros((3, n, 3, n))
+        covariance, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
         pairs = [(k, k) for k in range(3)]
         pairs += [(0, 1), (0, 2), (1, 2)] * couples_channels(self.solution)
         step, kind = block_of(planes)
+        inverse = [pseudo_inverse(M) for M in self.solution.equations.M] if self.is_render else []
         for start in with_progress(range(0, self.painted.size, step)):
             part = as_slice(self.painted[start : start + step])
             lit = planes.pixels(part)
             rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
+            for c, of_channel in enumerate(inverse):
+                # An answer follows the noise of pixels that decide it, and leaves less of it.
+                pull = self.D[part, c] * (lit[..., c] * (of_channel @ lit[..., c])).sum(axis=0)
+                rows[c] /= 1 - np.minimum(pull, MAX_LEVERAGE)
+                fourth[c] += np.square(np.square(rows[c], dtype=np.float64)).sum(axis=1)
             for c, d in pairs:
                 # Its noise, too, is the noise of paths, which carry all channels.
                 product = rows[c] @ rows[d].T
                 covariance[c, :, d] += product
                 if c != d:
                     covariance[d, :, c] += product.T
-        return covariance
+        second = np.einsum("cici->ci", covariance)
+        return covariance, (np.square(second) / np.where(fourth > 0, fourth, np.nan)).T
 
-    def filter_error(self, unbiased: NormalEquations, weights: Doubles) -> tuple[float, Doubles]:
-        """Return α, from 0 where the painting seems to have a box filter to 1, and the error of
-        weights by it, (n, 3).
 
-        unbiased: the equations without noise, whose solution these weights are.
-        """
-        nothing = 0.0, np.zeros(weights.shape)
-        product, power, lacking, spread = np.sum([self._sums(c) for c in range(3)], axis=0).tolist()
-        # A share of at most 1 explains at most this much.
-        if product <= max(MIN_EXPLAINED * lacking, SURE * math.sqrt(spread)):
-            return nothing
-        a = self._products()
-        b = unbiased.b + a
-        whole = solve_for(self.solution, NormalEquations(unbiased.M, b, unbiased.target_norm2))
-        error = np.asarray(whole - weights)
-        own = power - float((a * error.T).sum())
-        if own <= MIN_OWN * power or product > MAX_SHARE * own:
-            return nothing
-        share = min(product / own, 1.0)
-        return (share, share * error) if share * product > MIN_EXPLAINED * lacking else nothing
+def _own_variance(solution: Solution, D: Doubles, r: Doubles, r_half: Doubles) -> Doubles:
+    """Return D times the squared residual of each pixel, less the share of it that is noise of the
+    prediction around the pixel, (p, 3).
+    """
+    size = *solution.importance.shape, 3
+    squares, of_noise = (D * np.square(x) for x in (r, r_half))
+    around, noise_around = (box_mean(x.reshape(size), WINDOW) for x in (squares, of_noise))
+    share = 1 - noise_around / np.where(around > 0, around, 1)
+    return np.asarray(np.maximum(share, 0).reshape(-1, 3) * squares)
 
-    def _sums(self, c: int) -> tuple[float, float, float, float]:
-        """Return sums over the pixels of a channel, less noise: Σ D h r, Σ D h², Σ D r², and the
-        variance of the first.
-        """
-        everything, D, variance = slice(0, len(self.D)), self.D[:, c], self.variance[:, c]
-        r, r_half = (
-            self.residuals.residual(everything)[:, c],
-            -self.residuals.noise(everything)[:, c],
+
+def painting_grain(solution: Solution, D: Doubles, r: Doubles, r_half: Doubles) -> Doubles:
+    """Return D times the variance of a painting's noise by its grain, (p, 3).
+
+    D: (p, 3), weights of pixels. r, r_half: (p, 3), the residual and the half difference of the
+    prediction.
+    """
+    size, counted = solution.importance.shape, solution.importance > 0
+    variance = np.zeros(r.shape)
+    for c in range(3):
+        of_both, of_prediction = (
+            channel_grain((np.sqrt(D[:, c]) * x[:, c]).reshape(size), counted).ravel()
+            for x in (r, r_half)
         )
-        h, h_half = self._changes(c)
-        return (
-            float(D @ (h * r - h_half * r_half)),
-            float(D @ (np.square(h) - np.square(h_half))),
-            float(D @ (np.square(r) - np.square(r_half)) - variance.sum()),
-            float((D * np.square(h)) @ (variance + D * np.square(r_half))),
-        )
-
-    def _changes(self, c: int) -> tuple[Doubles, Doubles]:
-        """Return h and h′ of a channel, (p,)."""
-        views, size = self.solution.problem.views, self.solution.importance.shape
-
-        def change(image: Floats) -> Doubles:
-            whole = image[:, c].reshape(size)
-            parts = [views.part(whole, k).astype(np.float64) for k in range(len(views))]
-            return np.asarray(views.join([filtered(x) - x for x in parts]).ravel())
-
-        return change(self.residuals.predicted), change(self.residuals.half)
-
-    def _products(self) -> Doubles:
-        """Return Σ D (Φ h − Φ′ h′), (3, n)."""
-        basis = self.solution.basis
-        sums, (step, _) = np.zeros((3, len(basis.lights))), block_of(basis.planes)
-        changes = [[self.D[:, c] * x for x in self._changes(c)] for c in range(3)]
-        for start in with_progress(range(0, self.painted.size, step)):
-            part = as_slice(self.painted[start : start + step])
-            light, noise = basis.planes.pixels(part), basis.noise.pixels(part)
-            for c, (h, h_half) in enumerate(changes):
-                sums[c] += light[..., c] @ h[part] - noise[..., c] @ h_half[part]
-        return sums
+        variance[:, c] = np.maximum(of_both - of_prediction, 0)
+    return variance
 
 
-def filtered(image: Doubles) -> Doubles:
-    """Return a picture of a channel with a box filter, (h, w), with a Gaussian one."""
-    for axis in (0, 1):
-        lines = np.moveaxis(np.pad(image, 1, mode="edge"), axis, 0)
-        beside = np.moveaxis(lines[:-2] + lines[2:], 0, axis)
-        beside = beside[:, 1:-1] if axis == 0 else beside[1:-1]
-        image = (1 - 2 * TAP) * image + TAP * beside
-    return image
+def _rendered_share(solution: Solution, light: Floats, r: Doubles, r_half: Doubles) -> float:
+    """Return how far a painting counts as a render, 0 to 1. light: (p, 3), the prediction."""
+    if solution.problem.filter_share:
+        return 1.0
+    unit = np.abs(light) + DARK * float(np.abs(light).mean(dtype=np.float64))
+    D = (solution.importance.reshape(-1, 1) > 0) / np.square(np.where(unit > 0, unit, 1))
+    left = float((D * (np.square(r) - np.square(r_half))).sum())
+    if left <= 0:
+        return 0.0
+    low, high = RENDERED
+    share = float(painting_grain(solution, D, r, r_half).sum()) / left
+    return min(max((share - low) / (high - low), 0.0), 1.0)

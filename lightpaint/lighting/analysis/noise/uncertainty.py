@@ -43,11 +43,7 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
 )
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.painting_noise import CORRELATION, PaintingNoise
-from lightpaint.lighting.analysis.noise.weight_directions import (
-    NORMAL,
-    WeightResponse,
-    solve_for,
-)
+from lightpaint.lighting.analysis.noise.weight_directions import NORMAL, WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -223,7 +219,7 @@ class Uncertainty:
             at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
         painting_scatter: (n, 3), standard deviation by noise of the painting, where that is a
-            render or a photograph, and by its filter; more samples of the basis do not lower it.
+            render or a photograph; more samples of the basis do not lower it.
         interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
             limit it has one side, which is never empty.
         objective_error: (3,), standard deviation of the objective.
@@ -234,7 +230,7 @@ class Uncertainty:
         untold: (n,), the lights that these samples do not determine: little of their light stands
             out from noise in what is painted, and their interval is wider than they are bright.
         is_filtered: Whether the painting seems to be rendered with a wider reconstruction filter
-            than the box of a basis.
+            than the box of a basis, whose effect was taken out of it.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -316,10 +312,9 @@ def error_bars(
     scatters = problem.solved if problem.refinement is None else unbiased
     response = WeightResponse(solution, scatters, unbiased, weights + bias)
     spread = response.spread(noise.full_covariance)
-    by_painting, moved = np.zeros((2, *weights.shape))
-    filter_share = 0.0
+    by_painting, wide_by_painting, moved = np.zeros((3, *weights.shape))
     if with_painting:
-        by_painting, filter_share = _error_by_painting(solution, unbiased, weights + bias, response)
+        by_painting, wide_by_painting = _scatter_by_painting(solution, response)
     del response  # of many lights it is large
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
@@ -341,7 +336,7 @@ def error_bars(
         for parts in (
             (spread.inside, unsteady, reading.scatter),
             (
-                *(spread.inside * noise.widening, by_painting, unsteady),
+                *(spread.inside * noise.widening, wide_by_painting, unsteady),
                 reading.scatter * reading.widening,
             ),
         )
@@ -360,22 +355,21 @@ def error_bars(
         solution.norm2,
         (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | spread.is_far)
         & _is_wide(weights, interval),
-        filter_share > 0,
+        problem.filter_share > 0,
     )
 
 
-def _error_by_painting(
-    solution: Solution, unbiased: NormalEquations, weights: Doubles, response: WeightResponse
-) -> tuple[Doubles, float]:
-    """Return the standard deviations of the weights by noise and filter of the painting, (n, 3),
-    and the share of a wider filter in it.
+def _scatter_by_painting(solution: Solution, response: WeightResponse) -> tuple[Doubles, Doubles]:
+    """Return the standard deviations of the weights by noise of the painting, and the same wider
+    where few pixels tell them, (n, 3) each.
     """
-    painting = PaintingNoise.of(solution)
-    covariance, (share, by_filter) = painting.covariance(), painting.filter_error(unbiased, weights)
-    if covariance is None:
-        return np.abs(by_filter), share
-    covariance *= 1 + share * (CORRELATION - 1)
-    return _root(response.spread(covariance).inside, by_filter), share
+    found = PaintingNoise.of(solution).covariance()
+    if found is None:
+        return (np.zeros_like(solution.weights),) * 2
+    covariance, freedom = found
+    covariance *= 1 + solution.problem.filter_share * (CORRELATION - 1)
+    inside = response.spread(covariance).inside
+    return inside, inside * t_ratios(freedom)
 
 
 def _scatter_by_poses(solution: Solution, level_errors: Sequence[tuple[str, RGB]]) -> Doubles:
