@@ -301,7 +301,7 @@ class PlacementFit:
         """
         residual = self._residual(fitted.columns, fitted.weights)[:, its]
         noise = self._noise(fitted.columns, fitted.weights)[:, its]
-        noise, counted = np.resize(noise, residual.shape), self._root[:, its].any(axis=1)
+        noise, counted = np.resize(noise, residual.shape), np.any(self._root[:, its], axis=1)
         covariance, end = np.zeros((len(rows), len(rows))), 0
         for size in self._sizes:
             view, end = slice(end, end + math.prod(size)), end + math.prod(size)

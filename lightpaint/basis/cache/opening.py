@@ -121,7 +121,7 @@ def _names(archive: zipfile.ZipFile) -> set[str]:
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
-    """Return an array, read-only. NumPy reads those of an archive in small pieces.
+    """Return an array, read-only. NumPy would read it in small pieces.
 
     Raises one of `_READ_ERRORS` for a damaged one.
     """

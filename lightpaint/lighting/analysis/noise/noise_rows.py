@@ -329,7 +329,7 @@ class LitPairs:
 
     @cached_property
     def _runs(self) -> Indices:
-        """Where the pixels of another light begin, which follow each other by strips."""
+        """Return where the pixels of another light begin, which follow each other by strips."""
         return np.flatnonzero(np.diff(self.lights, prepend=-1))
 
     def _of_lights(self, values: npt.NDArray[Any]) -> Doubles:

@@ -57,7 +57,7 @@ ROUNDS = 4
 
 @dataclass(frozen=True)
 class FilterEffect:
-    """What a filter adds to a picture. image: (p, 3); half: (p, 3), its half differences."""
+    """The light that a filter adds to a picture. image: (p, 3); half: (p, 3), its half differences."""
 
     image: Doubles
     half: Doubles
