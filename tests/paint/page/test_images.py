@@ -256,7 +256,8 @@ def test_lists_of_lights_have_an_image_once(painter: Painter) -> None:
     page = painter.page
     page.evaluate(
         """() => painter.store.set({ probe: {
-          object: 'floor', index: 2, light: [1, 1, 1], shares: [0.4, 0, 0, ...Array(12).fill(0.05)]
+          object: 'floor', index: 2, place: [1, 1], light: [1, 1, 1], paint: [1, 1, 1],
+          shares: [0.4, 0, 0, ...Array(12).fill(0.05)]
         } })"""
     )
     painter.still()
