@@ -13,8 +13,8 @@ not; and the same of the half differences of the prediction, for its own noise.
 
 A filter wider than a pixel correlates neighbours along an axis by ρ. That makes sums over many
 pixels (1 + 2 ρ)² times as variable, and leaves (1 − 4/3 ρ)² of the variance of N r with taps beside
-each other. Two pixels apart, taps are independent. The ratio of both is the ratio of the means of |N r|,
-which a few noisy pixels do not decide.
+each other. Two pixels apart, taps are independent. The means of |N r| give the ratio of both, which
+a few noisy pixels do not decide.
 """
 
 import math
