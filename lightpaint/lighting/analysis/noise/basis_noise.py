@@ -351,7 +351,8 @@ def denoised_matrix(equations: NormalEquations, power: Doubles) -> Doubles:
     M.
     """
     denoised = np.empty_like(equations.M)
-    for c, M in enumerate(equations.M):
+    for c in with_progress(range(3), "channels"):
+        M = equations.M[c]
         root, inverse = _roots(M)
         noise = inverse @ power[c] @ inverse.T
         with one_thread() if len(M) <= SMALL_MATRIX else nullcontext():
