@@ -57,7 +57,7 @@ ROUNDS = 4
 
 @dataclass(frozen=True)
 class FilterEffect:
-    """The light that a filter adds to a picture. image: (p, 3); half: (p, 3), its half differences."""
+    """The change of a picture by a filter. image: (p, 3); half: (p, 3), its half differences."""
 
     image: Doubles
     half: Doubles
