@@ -27,7 +27,7 @@ import numpy as np
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.batch.cluster.dask_engine import Cluster
+from lightpaint.batch.dask_engine import Cluster
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.plan.planner import plan_batch

@@ -14,7 +14,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.basis.cache.basis_cache import MAX_BYTES
-from lightpaint.batch.cluster.dask_engine import LIMIT_FACTOR, MIN_LIMIT_S
+from lightpaint.batch.dask_engine import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
 from lightpaint.batch.manifest.file_names import MAX_VISITED

@@ -12,7 +12,7 @@ from typing import Any
 
 from lightpaint.basis import Basis
 from lightpaint.batch import task_bases
-from lightpaint.batch.cluster.dask_engine import Cluster
+from lightpaint.batch.dask_engine import Cluster
 from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
 from lightpaint.batch.engine import Engine, InProcess, Processes
 from lightpaint.batch.gallery.gallery_page import write_gallery, write_task_planes

@@ -21,7 +21,7 @@ from renderer import write_room
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
-from lightpaint.batch.cluster.dask_engine import Cluster
+from lightpaint.batch.dask_engine import Cluster
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
@@ -336,12 +336,12 @@ def test_without_dask_the_line_is_said_that_installs_it(
 def test_workers_of_another_version_are_left_out(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from lightpaint.batch.cluster import parcels
+    from lightpaint.batch import parcels
 
     workers.await_all()
     own_versions = {**parcels.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
-    monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: own_versions)
+    monkeypatch.setattr("lightpaint.batch.dask_workers.own_versions", lambda: own_versions)
     listener = ItemListener()
     with Cluster(workers.address, listener):  # type: ignore[arg-type]
         assert sum("is left out: it has lightpaint" in text for text in listener.remarks) == 2

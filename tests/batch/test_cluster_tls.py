@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from batches import SilentListener
 
-from lightpaint.batch.cluster.workers import ClusterWorkers
+from lightpaint.batch.dask_workers import ClusterWorkers
 from lightpaint.errors import BatchError
 
 dask = pytest.importorskip("dask", reason="Dask")

@@ -12,7 +12,6 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.batch.cluster.parcels import FileHashes, ParcelStore, pack, pieces
 from lightpaint.batch.gallery.summary import (
     LightRow,
     ObserverRow,
@@ -22,6 +21,7 @@ from lightpaint.batch.gallery.summary import (
     planes_of_answer,
     summary_csv,
 )
+from lightpaint.batch.parcels import FileHashes, ParcelStore, pack, pieces
 from lightpaint.batch.plan.plan_steps import estimate
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch

@@ -8,7 +8,7 @@ import pytest
 from batches import contents, write_batch
 from light_groups import interleaved, pictures
 
-from lightpaint.batch.cluster.parcels import FileHashes, Parcel, ParcelStore, pack, pieces, unpack
+from lightpaint.batch.parcels import FileHashes, Parcel, ParcelStore, pack, pieces, unpack
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.item_execution import run_item

@@ -16,10 +16,10 @@ from typing import Any
 import pytest
 from batches import SilentListener
 
-from lightpaint.batch.cluster import workers
-from lightpaint.batch.cluster.dask_engine import Cluster
-from lightpaint.batch.cluster.parcels import unpack
-from lightpaint.batch.cluster.workers import ClusterWorkers, collect_lost_clients
+from lightpaint.batch import dask_workers
+from lightpaint.batch.dask_engine import Cluster
+from lightpaint.batch.dask_workers import ClusterWorkers, collect_lost_clients
+from lightpaint.batch.parcels import unpack
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError
 
@@ -58,8 +58,8 @@ def fake_server(with_bytes: bytes | None) -> Iterator[str]:
 def test_one_that_ends_while_it_is_reached(
     reply: bytes | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(workers, "ANSWER_S", 1.0)
-    monkeypatch.setattr(workers, "GONE_S", 0.5)
+    monkeypatch.setattr(dask_workers, "ANSWER_S", 1.0)
+    monkeypatch.setattr(dask_workers, "GONE_S", 0.5)
     began_s = time.monotonic()
     with fake_server(reply) as address, pytest.raises(BatchError) as refusal:
         ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]

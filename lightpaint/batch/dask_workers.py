@@ -19,9 +19,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lightpaint.batch.cluster import parcels
-from lightpaint.batch.cluster.parcels import Parcel, files_to_send, pieces
-from lightpaint.batch.cluster.parcels import versions as own_versions
+from lightpaint.batch import parcels
+from lightpaint.batch.parcels import Parcel, files_to_send, pieces
+from lightpaint.batch.parcels import versions as own_versions
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import call_with_timeout, first_line
 from lightpaint.progress import Listener

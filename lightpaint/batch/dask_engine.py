@@ -13,9 +13,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from lightpaint.batch.cluster.parcels import FileHashes, pack, unpack
-from lightpaint.batch.cluster.workers import ANSWER_S, DASK_ERRORS, ClusterWorkers
+from lightpaint.batch.dask_workers import ANSWER_S, DASK_ERRORS, ClusterWorkers
 from lightpaint.batch.engine import LOST_TEXT, MAX_TRIES
+from lightpaint.batch.parcels import FileHashes, pack, unpack
 from lightpaint.batch.work.item_execution import is_disk_full
 from lightpaint.batch.work.work_items import ItemResult, WorkItem, item_label
 from lightpaint.errors import LightpaintError
