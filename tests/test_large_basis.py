@@ -11,11 +11,11 @@ from nightly import nightly
 from PIL import Image
 
 import lightpaint as lp
+from lightpaint import images
 from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.images import denoiser, pixel_blocks
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import pixel_loss
-from lightpaint.report import answer_pictures
 
 #: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 3.5 GB at
 #: 3840 x 2160, where libraries and strips of 100 lights take another half.
@@ -35,7 +35,7 @@ def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     patch.setattr(pixel_blocks, "BAND_PIXELS", large // 8)
     patch.setattr(pixel_loss, "MAX_KEPT_PIXELS", large)
     patch.setattr(pixel_loss, "STRIP_PIXELS", min(pixel_loss.STRIP_PIXELS, large // 4))
-    for module in (pixel_blocks, denoiser, answer_pictures):
+    for module in (pixel_blocks, denoiser, images):
         patch.setattr(module, "LARGE_PICTURE", large)
 
 

@@ -278,9 +278,8 @@ class Encoder(ViewTransform):
 
     def encode(self, image: Floats) -> Floats:
         """Return the display values of `ViewTransform.encode`, read-only."""
-        if (
-            image.size >= 3 * images.LARGE_PICTURE
-        ):  # which would be kept as long as the report is made
+        if image.size >= 3 * images.LARGE_PICTURE:
+            # Which would be kept as long as the report is made.
             return np.asarray(images.by_bands(super().encode, image))
         if isinstance(image.base, np.ndarray) and image.base.size > image.size:
             return super().encode(image)  # a band of a large picture
