@@ -144,7 +144,7 @@ class BlockPlanes(RowPlanes):
         """Return some blocks of all planes, (n, p, 3). If they are few, only their own pixels are
         read.
         """
-        if isinstance(where, slice) or SPARSE * len(where) > np.ptp(where) + 1:
+        if isinstance(where, slice) or (len(where) > 0 and SPARSE * len(where) > np.ptp(where) + 1):
             return super().pixels(where)
         means = np.empty((self.count, len(where), 3), np.float32)
         step = max(1, BLOCK_PIXELS // self._side**2)

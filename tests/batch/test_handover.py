@@ -10,6 +10,7 @@ from command import run, run_refused, succeed
 from light_groups import interleaved, pictures
 from renderer import write_room
 
+from lightpaint import read_light_groups, write_basis
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 
@@ -60,6 +61,19 @@ def run_looks(folder: Path, *arguments: Any) -> dict[str, Any]:
     return dict(
         json.loads(succeed(folder, "batch", "looks.toml", "-o", "out", "--json", "-q", *arguments))
     )
+
+
+@pytest.mark.parametrize("key", ["light_groups", "basis"])
+def test_a_first_manifest_of_lights_without_a_scene_can_be_run(folder: Path, key: str) -> None:
+    """It wants nothing that a scene is needed for."""
+    source = "groups.exr"
+    if key == "basis":
+        source = "b.basis.exr"
+        write_basis(folder / source, read_light_groups(folder / "groups.exr").basis)
+    succeed(folder, "batch", "--init", source, "dim.exr", "bright.exr", "-o", "l.toml")
+    assert f'{key} = "{source}"' in (folder / "l.toml").read_text("utf-8")
+    plan = succeed(folder, "batch", "l.toml", "--dry-run", "-o", "out").splitlines()
+    assert [x.split(maxsplit=1)[0] for x in plan] == ["look", "dim", "bright", "looks"]
 
 
 @pytest.mark.nightly

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis import is_basis_file, is_light_groups
 from lightpaint.batch.manifest.keys import (
     DEFAULT_KEYS,
     LIGHTING_STEPS,
@@ -45,13 +46,18 @@ STARTER = """\
 # docs/batch.md has all keys. Paths are relative to this file.
 
 [defaults]
-scene = {scene}
+{source}
+
+"""
+
+#: What a first manifest wants of looks of a scene, and of those that nothing can be rendered for.
+SCENE_DEFAULTS = """\
 want = ["solve", "predict", "verify", "report"]  # "render": a final render; "export": for others
 
 [defaults.settings]
-quality = "preview"
-
+quality = "preview"\
 """
+BASIS_DEFAULTS = 'want = ["solve", "predict", "report"]  # "export": for others'
 
 
 @dataclass(frozen=True)
@@ -200,7 +206,8 @@ def subject_keys(look: Mapping[str, Any]) -> list[str]:
 def write_starter_manifest(
     path: Path, scene: str, paintings: Sequence[str], *, force: bool = False
 ) -> None:
-    """Write a manifest to `path` with a look for each painting of one scene.
+    """Write a manifest to `path` with a look for each painting of one scene, basis file or EXR of
+    light groups.
 
     Raises BatchError if there is no painting, or a file does not exist, and OutputError if the
     manifest exists already.
@@ -208,7 +215,7 @@ def write_starter_manifest(
     if not paintings:
         raise BatchError("no painting to begin with: give the scene, then paintings")
     for file in (scene, *paintings):
-        if not Path(file).is_file():
+        if not Path(file).is_file() and not (file == scene and is_light_groups(Path(scene))):
             raise BatchError(f"no such file: {file}")
     check_files([path], map(Path, (scene, *paintings)))
     if path.exists() and not force:
@@ -219,10 +226,21 @@ def write_starter_manifest(
             Hint("force", True),
         )
     base = path.parent
-    text = STARTER.format(name=path.name, scene=_quoted(scene, base))
+    text = STARTER.format(name=path.name, source=_source_defaults(scene, base))
     write_text(
         path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
     )
+
+
+def _source_defaults(source: str, base: Path) -> str:
+    """Return the defaults of looks of a scene, a basis or light groups."""
+    if Path(source).suffix.lower() != ".xml" and is_light_groups(Path(source)):
+        key, defaults = "light_groups", BASIS_DEFAULTS
+    elif is_basis_file(Path(source)):
+        key, defaults = "basis", BASIS_DEFAULTS
+    else:
+        key, defaults = "scene", SCENE_DEFAULTS
+    return f"{key} = {_quoted(source, base)}\n{defaults}"
 
 
 def _quoted(file: str, base: Path) -> str:

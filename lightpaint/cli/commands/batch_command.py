@@ -221,10 +221,11 @@ def _show_plan(plan: Plan) -> CommandOutcome:
         document = {"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want}
         looks.append({**document, "why": look.failure} if look.failure else document)
     terminal.print_table(table)
-    cost, lux = estimate(plan), " and lux" * bool(plan.measurements)
+    cost, lux, bases = estimate(plan), " and lux" * bool(plan.measurements), ""
+    if cost.bases_s:
+        bases = f"bases{lux} {spoken_time(cost.bases_s)} unless they are in the cache, "
     terminal.write(
-        f"bases{lux} {spoken_time(cost.bases_s)} unless they are in the cache, looks "
-        f"{spoken_time(cost.looks_s)}, by one process on two cores; "
+        f"{bases}looks {spoken_time(cost.looks_s)}, by one process on two cores; "
         f"{cost.memory / 1e9:.1f} GB of memory"
     )
     failed_names = [look.entry.name for look in plan.chosen_looks if look.failure]
