@@ -206,18 +206,24 @@ class PixelGradients:
             return cls(D * residuals.residual(everything), -D * residuals.noise(everything))
         pixels, look = problem.loss.pixels, None
         light = _Steadied.of(solution, residuals.predicted, residuals.half, pixels.guide)
-        light = light.within_clipping(pixels)
         if residuals.current is not None:
             shown = solution.basis.current_look.reshape(-1, 3)
             look = _Steadied.of(solution, shown, residuals.current)
-        tangent = _Tangent(pixels, light, look)
-        whole, start = _gradient(pixels, planes_of(residuals.predicted)), tangent.start()
-        mean = start + tangent.along([x.distance for x in tangent.pictures])
-        half = tangent.along([x.noise for x in tangent.pictures])
-        left = [x.noise_left for x in tangent.pictures]
-        ends = [tangent.at([sign * x for x in left]) for sign in (1, -1)]
-        doubt = (ends[0] + ends[1]) / 2 - start
-        return cls(mean.T, half.T, (whole - mean).T, doubt.T)
+        mean, half, bend, doubt = np.empty((4, *light.steady.shape))
+
+        def fill(strip: slice, part: PixelLoss) -> None:
+            own = light.part(strip).within_clipping(part)
+            tangent = _Tangent(part, own, None if look is None else look.part(strip))
+            whole = _gradient(part, planes_of(residuals.predicted[strip]))
+            start, left = tangent.start(), [x.noise_left for x in tangent.pictures]
+            mean[:, strip] = start + tangent.along([x.distance for x in tangent.pictures])
+            half[:, strip] = tangent.along([x.noise for x in tangent.pictures])
+            bend[:, strip] = whole - mean[:, strip]
+            ends = [tangent.at([sign * x for x in left]) for sign in (1, -1)]
+            doubt[:, strip] = (ends[0] + ends[1]) / 2 - start
+
+        pixels.map_strips(fill)
+        return cls(mean.T, half.T, bend.T, doubt.T)
 
 
 @dataclass(frozen=True)
@@ -252,6 +258,11 @@ class _Steadied:
         steady, share = (planes_of(views.join(x)) for x in zip(*parts, strict=True))
         own = planes_of(noise)
         return cls(steady, planes_of(light) - steady, own, np.sqrt(1 - np.square(share)) * own)
+
+    def part(self, strip: slice) -> "_Steadied":
+        """Return the same of some pixels."""
+        everything = (self.steady, self.distance, self.noise, self.noise_left)
+        return _Steadied(*(x[:, strip] for x in everything))
 
     def within_clipping(self, pixels: PixelLoss) -> "_Steadied":
         """Return the same with pixels left as they are that would enter or leave clipping: no
