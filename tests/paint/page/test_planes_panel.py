@@ -94,6 +94,7 @@ def test_numbers_follow_the_brush_and_say_that_lights_have_moved(new_painter: An
     version = painter.ui("version") + 1
     new = reading(320.0, is_met=False, is_old=True)
     painter.tell(kind="answer", version=version, stroke=1, exact=False, reading=new, arrays={})
+    painter.page.get_by_text("320").wait_for()  # panels come after pictures
     numbers = painter.page.locator(".plane-numbers").inner_text()
     assert "Em 320 lx" in " ".join(numbers.split())
     assert painter.page.locator(".plane-wish.is-missed").count() == 2

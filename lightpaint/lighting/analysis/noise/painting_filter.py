@@ -41,6 +41,10 @@ TAP = (1 - math.erf(math.sqrt(0.5))) / 2
 #: Least share of the residual beside noise that the filter of a render explains.
 MIN_EXPLAINED = 0.8
 
+#: Least part of the squared residual that is not grain. In light that changes from pixel to pixel,
+#: a brush, or paint that ends at white, may leave as much as a filter.
+MIN_STRUCTURED = 0.5
+
 #: Standard errors beyond which noise does not make Σ D h r.
 SURE = 8.0
 
@@ -119,7 +123,10 @@ def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, F
     if taken is not None:
         missed = FilterEffect(missed.image + taken.image, missed.half + taken.half)
     product, power = _dot(D, h, missed), _dot(D, h, h)
-    lacking = _dot(D, missed, missed) - float(grain.sum())
+    squares = _dot(D, missed, missed)
+    lacking = squares - float(grain.sum())
+    if lacking < MIN_STRUCTURED * squares:
+        return None
     spread = float((D * np.square(h.image) * (grain + D * np.square(missed.half))).sum())
     # A share of at most 1 explains at most this much.
     if product <= max(MIN_EXPLAINED * lacking, SURE * math.sqrt(spread)):
