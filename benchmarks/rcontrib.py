@@ -84,6 +84,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--options", nargs="+", default=OPTIONS, help="sets for rcontrib")
     options = parser.parse_args()
+    if options.rays < 2 or options.rays % 2:
+        parser.error(f"--rays {options.rays}: pixels have two halves, so give an even number")
     print(
         f"{'lamps':>6s}{'lightpaint, s':>15s}{'rcontrib, s':>13s}{'means apart':>13s}"
         f"{'rcontrib / lightpaint':>23s}  best options"
