@@ -4,7 +4,7 @@ Light is divided by a power of two and rounded to half floats whose lowest bits 
 rounding error is relative, as with a logarithm. Of these integers, green is stored directly, red
 and blue as differences from green. Each channel is predicted from its neighbours above and to the
 left, and only the residuals are written: their lower bytes, then their upper ones, deflated.
-`packed_picture.js` reads them in the page.
+`viewer/mixer/mixer_data.js` reads them in the page.
 """
 
 import zlib

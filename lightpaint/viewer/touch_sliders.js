@@ -7,15 +7,13 @@ const MIN_DRAG_PIXELS = 6;
 /** Approximate width of a slider's thumb: its centre stays half of it away from the ends. */
 const THUMB_PIXELS = 18;
 
-/**
- * A slider that a touch moves only by a sideways drag or a tap; a scroll changes nothing. The
+/** A slider that a touch moves only by a sideways drag or a tap; a scroll changes nothing. The
  * browser's own handling of touch, which begins at once, is suppressed; it keeps mouse, pen and
  * keys.
  * @param {HTMLInputElement} input
  * @param {(value: number, isFinal: boolean) => void} move done: false while the finger is down
  * @param {() => void} restore have it show its value again
- * @param {AbortSignal} [signal] ends it
- */
+ * @param {AbortSignal} [signal] ends it */
 export function slideByTouch(input, move, restore, signal) {
   /** @type {{id: number, x: number, y: number, isSliding: boolean} | null} */
   let finger = null;

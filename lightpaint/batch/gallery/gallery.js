@@ -10,7 +10,7 @@ import { LookComparison } from './look_comparison.js';
 import { LightsTable } from './look_lights.js';
 import { LookMixers } from './look_mixers.js';
 
-/** @typedef {import("./gallery_data.js").Look} Look */
+/** @import { Look } from './gallery_data.js' */
 
 /** Sorts 10 after 9. */
 const NUMERIC = { numeric: true };

@@ -1,7 +1,7 @@
 /** The looks of a gallery, from JSON in the page, and the formats of their numbers. */
 import { createElement } from '../../viewer/mixer/page_elements.js';
 
-/** @typedef {import("../../viewer/drawing/colour.js").RGB} RGB */
+/** @import { RGB } from '../../viewer/drawing/colour.js' */
 /** @typedef {import("../../viewer/mixer/mixer_data.js").Data["transform"]} Transform */
 /** @typedef {{name: string, y: number, emission?: RGB, hex?: string, kelvin?: number, duv?: number,
  *   stops?: number, share?: number}} LookLight */

@@ -2,7 +2,7 @@
 import { createElement } from '../../viewer/mixer/page_elements.js';
 import { aspectOf, looks, titleOf } from './gallery_data.js';
 
-/** @typedef {import("./gallery_data.js").Look} Look */
+/** @import { Look } from './gallery_data.js' */
 /** @typedef {'a' | 'b'} Side */
 /** mix: null for a look without a mixer.
  * @typedef {{enlarge: (look: Look) => void, choose: (side: Side, look: Look) => void,

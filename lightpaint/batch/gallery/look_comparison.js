@@ -12,8 +12,8 @@ import {
   titleOf,
 } from './gallery_data.js';
 
-/** @typedef {import("./gallery_data.js").Look} Look */
-/** @typedef {import("./look_cards.js").Side} Side */
+/** @import { Look } from './gallery_data.js' */
+/** @import { Side } from './look_cards.js' */
 
 export class LookComparison {
   /** @param {() => Look[]} shownLooks the looks that the filter leaves, in their order */

@@ -12,7 +12,7 @@ import {
   titleOf,
 } from './gallery_data.js';
 
-/** @typedef {import("./gallery_data.js").Look} Look */
+/** @import { Look } from './gallery_data.js' */
 
 /** Stops below its brightest value at which a light's bar has no length. */
 const BAR_STOPS = 10;

@@ -3,8 +3,7 @@ import { begin } from '../../viewer/mixer/mixer.js';
 import { createElement } from '../../viewer/mixer/page_elements.js';
 import { elementOf, inputOf, looks, titleOf, transforms } from './gallery_data.js';
 
-/** @typedef {import("./gallery_data.js").Look} Look */
-/** @typedef {import("./gallery_data.js").LookLight} LookLight */
+/** @import { Look, LookLight } from './gallery_data.js' */
 
 /** Distance from Planck's locus up to which a light has a colour temperature. */
 const WHITE_DUV = 0.02;

@@ -3,7 +3,7 @@
 import { html, render, useEffect, useState } from './vendor/preact.js';
 import { refreshProbe } from './ui/brush_cursor.js';
 import { ColourPanel } from './ui/colour_panel.js';
-import { Fold } from './ui/controls.js';
+import { Fold, Button, reveal } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
 import { HistoryPanel } from './ui/history_panel.js';
@@ -22,8 +22,7 @@ import {
 } from './ui/browser_storage.js';
 import { initialState } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
-import { dragPanel, stepPanel } from './ui/panels/panel_move.js';
-import { orderedPanels } from './ui/panels/panel_order.js';
+import { orderedPanels, dragPanel, stepPanel } from './ui/panels/panel_order.js';
 import { RoomPlan } from './ui/room_plan.js';
 import { PlanesPanel } from './ui/planes/planes_panel.js';
 import { ScopesPanel } from './ui/scopes/scopes_panel.js';
@@ -34,7 +33,6 @@ import { ReferencePane } from './ui/references/reference_pane.js';
 import { PresetsButton } from './ui/presets_dialog.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
-import { SkipLinks } from './ui/skip_links.js';
 import { Stage } from './ui/picture_stage.js';
 import { Store } from './ui/ui_store.js';
 import { AdjustPanel, ToolBar, ToolOptions } from './ui/toolbar.js';
@@ -44,23 +42,18 @@ import { startAtFirstVisit, Tour } from './ui/tour.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
 import { ViewTabs, showView } from './ui/view_tabs.js';
-import { watched } from './ui/watched_panel.js';
+import { watchedPanels } from './ui/watched_panel.js';
 import { language, plural, t } from './language/language.js';
 
-/** @typedef {import("./ui/engine_interface.js").Host} Host */
-/** @typedef {import("./ui/engine_interface.js").Engine} Engine */
-/** @typedef {import("./ui/ui_state.js").Ui} Ui */
-/** @typedef {import("./ui/shortcuts.js").App} App */
+/** @import { App, Engine, Host, Ui } from './ui/ui_state.js' */
 
-/**
- * Show the painter in an element.
+/** Show the painter in an element.
  *
  * `global`: keys work wherever the focus is, for a page that holds only the painter. `engine`: the
  * picture engine over that host. `isGuided`: the tour starts at the first visit.
  * @param {HTMLElement} element @param {Host} host
  * @param {{global?: boolean, engine: Engine, isGuided?: boolean}} options
- * @returns {Promise<{store: Store<Ui>, session: SessionController, close: () => void}>}
- */
+ * @returns {Promise<{store: Store<Ui>, session: SessionController, close: () => void}>} */
 export async function mount(element, host, { global = false, engine, isGuided = false }) {
   const open = { ...initialState().open, ...storedFolds() };
   const store = new Store({ ...initialState(), ...storedTool(), ...storedPreferences(), open });
@@ -171,38 +164,12 @@ function droppedText(count) {
 }
 
 /** The panels, each of which renders again only for the state that it shows. */
-const Watched = {
-  TopBar: watched(TopBar),
-  ToolBar: watched(ToolBar),
-  ToolOptions: watched(ToolOptions),
-  ViewTabs: watched(ViewTabs),
-  Stage: watched(Stage),
-  ReferencePane: watched(ReferencePane),
-  LookWall: watched(LookWall),
-  Banner: watched(Banner),
-  Toasts: watched(Toasts),
-  PointerStatus: watched(PointerStatus),
-  RunningTasks: watched(RunningTasks),
-  AnswerLine: watched(AnswerLine),
-  LookStrip: watched(LookStrip),
-  SettingsPanel: watched(SettingsPanel),
-  Dialogs: watched(Dialogs),
-  PreviewDialog: watched(PreviewDialog),
-  LayerImportDialog: watched(LayerImportDialog),
-  Tour: watched(Tour),
-  ColourPanel: watched(ColourPanel),
-  AdjustPanel: watched(AdjustPanel),
-  SelectionFields: watched(SelectionFields),
-  LayerPanel: watched(LayerPanel),
-  LayerCount: watched(LayerCount),
-  HistoryPanel: watched(HistoryPanel),
-  LightList: watched(LightList),
-  LightListActions: watched(LightListActions),
-  RoomPlan: watched(RoomPlan),
-  PlanesPanel: watched(PlanesPanel),
-  ScopesPanel: watched(ScopesPanel),
-  AnalysisPanel: watched(AnalysisPanel),
-};
+const Watched = watchedPanels({
+  TopBar, ToolBar, ToolOptions, ViewTabs, Stage, ReferencePane, LookWall, Banner, Toasts,
+  PointerStatus, RunningTasks, AnswerLine, LookStrip, SettingsPanel, Dialogs, PreviewDialog,
+  LayerImportDialog, Tour, ColourPanel, AdjustPanel, SelectionFields, LayerPanel, LayerCount,
+  HistoryPanel, LightList, LightListActions, RoomPlan, PlanesPanel, ScopesPanel, AnalysisPanel,
+});
 
 /** @param {{app: App, root: () => HTMLElement}} props */
 function Painter({ app, root }) {
@@ -285,4 +252,20 @@ function Side({ ui, app }) {
     ${orderedPanels(panels, ui.panelOrder)}
     <span class="only-read" role="status">${ui.panelNote}</span>
   </aside>`;
+}
+
+/** @param {{app: App}} props */
+function SkipLinks({ app: { store } }) {
+  const buttonOf = (/** @type {MouseEvent} */ event) =>
+    /** @type {HTMLElement} */ (event.currentTarget);
+  const skipToLights = (/** @type {MouseEvent} */ event) => {
+    const button = buttonOf(event);
+    store.set(({ open }) => ({ side: true, panel: null, open: { ...open, lights: true } }));
+    reveal(button, '.lights :is(.group-name, .light-name)', true);
+  };
+  return html`<nav class="skips" aria-label=${t('Skip links')}>
+    <${Button} label=${t('Skip to the pictures')} act=${(/** @type {MouseEvent} */ event) =>
+      reveal(buttonOf(event), '.stage', true)} />
+    <${Button} label=${t('Skip to the lights')} act=${skipToLights} />
+  </nav>`;
 }

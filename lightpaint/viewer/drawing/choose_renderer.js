@@ -8,7 +8,7 @@ import { CpuView } from './cpu.js';
 import { GlView } from './gl.js';
 import { DEFAULTS } from './view.js';
 
-/** @typedef {import("./view.js").PictureView} PictureView */
+/** @import { PictureView } from './view.js' */
 /** planeSize: height and width of planes, by default as the picture; onRestored: all is to be
  * set again. @typedef {{planeSize?: [number, number], onRestored?: () => void}} ViewOptions */
 
@@ -18,13 +18,11 @@ const QUICK_FRAME_MS = 12;
 /** Frame time in milliseconds below which no third frame is needed. */
 const SLOW_FRAME_MS = 100;
 
-/**
- * Create a view in an element, on a canvas of its own.
+/** Create a view in an element, on a canvas of its own.
  * @param {HTMLElement} element @param {[height: number, width: number]} size
  * @param {number} count of lights
  * @param {ViewOptions & {view?: 'gl' | 'cpu' | null}} [options] view: which one, whatever is faster
- * @returns {PictureView}
- */
+ * @returns {PictureView} */
 export function chooseView(element, size, count, options = {}) {
   const gl = options.view === 'cpu' ? null : glView(size, count, options);
   const isGl =

@@ -115,12 +115,10 @@ const TO_XYZ = [
   [0.01933082, 0.11919478, 0.95053215],
 ];
 
-/**
- * Planck's locus in CIE 1960 (u, v), and its direction towards lower temperatures: the rational
+/** Planck's locus in CIE 1960 (u, v), and its direction towards lower temperatures: the rational
  * approximation of M. Krystek, "An algorithm to calculate correlated colour temperature", Color
  * Research & Application 10 (1985), good to 1e-4 from 1000 to 15,000 K.
- * @param {number} kelvin @returns {{uv: [number, number], tangent: [number, number]}}
- */
+ * @param {number} kelvin @returns {{uv: [number, number], tangent: [number, number]}} */
 function locus(kelvin) {
   const t = kelvin;
   const a = 0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t * t;
@@ -144,4 +142,18 @@ function greenNormal([u, v]) {
 /** @param {(channel: number) => number} value @returns {RGB} */
 function mapChannels(value) {
   return [value(0), value(1), value(2)];
+}
+
+/** A colour whatever its brightness: its largest channel is 1. @param {RGB} rgb @returns {RGB} */
+export function atFullBrightness(rgb) {
+  const maxChannel = Math.max(...rgb) || 1;
+  return /** @type {RGB} */ (rgb.map((x) => x / maxChannel));
+}
+
+/** Return whether two colours differ at most in brightness. @param {RGB} a @param {RGB} b
+ * @param {number} tolerance of a channel, relative to the largest one */
+export function isSameHue(a, b, tolerance) {
+  const [first, second] = [Math.max(...a), Math.max(...b)];
+  const isEqual = a.every((x, c) => Math.abs(x / first - b[c] / second) < tolerance);
+  return first > 0 && second > 0 && isEqual;
 }

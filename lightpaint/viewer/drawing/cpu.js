@@ -5,6 +5,7 @@
  * the budget, only every second row and column is mixed while the brush is down, and all when it
  * rests.
  */
+import { stepFor } from './coarse_planes.js';
 import { VALUES, replaceNonFinite, toFloats } from './half_floats.js';
 import { Layer } from './cpu_picture.js';
 import { SRGB } from './view_transform.js';
@@ -12,9 +13,8 @@ import { Mix } from './mix.js';
 import { INKS, drawFalseColour, maxImportance, inkOf, drawInk, drawMissed } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
-/** @typedef {import("./view.js").Kind} Kind */
-/** @typedef {import("./view.js").Params} Params */
-/** @typedef {import("./view.js").Region} Region */
+/** @import { Kind, Params, Region } from './view.js' */
+/** @import { Lut } from './view_transform.js' */
 
 /** Milliseconds of a live frame above which it is mixed at reduced size, and the number of values
  * (pixels times lights) that take about as long, for use before any timing. */
@@ -39,7 +39,7 @@ export class CpuView {
     this.mixes = { solution: new Mix(planeSize), other: new Mix(planeSize) };
     /** @type {Map<string, Layer>} */
     this.layers = new Map();
-    /** @type {import("./view_transform.js").Lut} */
+    /** @type {Lut} */
     this.lut = SRGB;
     /** @type {Float32Array} */
     this.importance = new Float32Array(0);
@@ -95,7 +95,7 @@ export class CpuView {
     for (const layer of this.layers.values()) layer.invalidate();
   }
 
-  /** @param {import("./view_transform.js").Lut} lut */
+  /** @param {Lut} lut */
   setLut(lut) {
     this.lut = lut;
   }
@@ -169,7 +169,7 @@ export class CpuView {
   updateMixLayer(kind, params) {
     const mix = this.mixes[kind];
     const startTime = performance.now();
-    const step = mix.stepFor(this.planes, this.step);
+    const step = stepFor(mix.weights, this.planes, this.step);
     const isOther = mix.update(this.planes, step, params.live);
     const layer = this.layer(kind, step);
     if (isOther) layer.setLight(mix.light);

@@ -1,7 +1,7 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
 import { encoderOf } from './view_transform.js';
 
-/** @typedef {import("./view.js").Region} Region */
+/** @import { Region } from './view.js' */
 
 export class Layer {
   /** @param {[height: number, width: number]} size of the picture

@@ -6,15 +6,14 @@
  */
 import { mixPlanes } from './cpu.js';
 import { Planes } from './gpu.js';
-import { repeatPixels } from './half_floats.js';
+import { repeatPixels } from './coarse_planes.js';
 import { Textures } from './textures.js';
 import { SRGB } from './view_transform.js';
 import { maxImportance } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
-/** @typedef {import("./view.js").Kind} Kind */
-/** @typedef {import("./view.js").Params} Params */
-/** @typedef {import("./view.js").Region} Region */
+/** @import { Kind, Pane, Params, Region } from './view.js' */
+/** @import { Lut } from './view_transform.js' */
 
 const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 };
 
@@ -69,7 +68,7 @@ export class GlView {
     });
     this.planes = new Planes(gl, this.planeSize);
     this.textures = this.pictureTextures();
-    /** @type {import("./view_transform.js").Lut} */
+    /** @type {Lut} */
     this.lut = SRGB;
     /** @type {WebGLTexture | null} */
     this.lattice = null;
@@ -151,7 +150,7 @@ export class GlView {
     this.beyond = beyond && this.textures.bytes(beyond);
   }
 
-  /** @param {import("./view_transform.js").Lut} lut */
+  /** @param {Lut} lut */
   setLut(lut) {
     if (lut === this.lut) return;
     this.lut = lut;
@@ -184,7 +183,7 @@ export class GlView {
     return (isMix ? this.planes.mixes[kind].texture : this.pictures.get(kind)) ?? null;
   }
 
-  /** @param {import("./view.js").Pane} pane @param {Params} params */
+  /** @param {Pane} pane @param {Params} params */
   show(pane, params) {
     const { gl, canvas, textures } = this;
     const picture = this.texture(pane.kind);

@@ -23,32 +23,6 @@ export function toFloats(halves, scale = 1) {
   return values;
 }
 
-/**
- * Return halves with every pixel repeated as a square, cut to the size of a picture.
- * @param {Uint16Array} halves of every step-th pixel of every step-th row, three each
- * @param {number} step @param {[height: number, width: number]} size
- */
-export function repeatPixels(halves, step, [height, width]) {
-  if (step === 1) return halves;
-  const rowLength = 3 * Math.ceil(width / step);
-  const whole = new Uint16Array(3 * width * height);
-  for (let y = 0; y < height; y += step) {
-    const start = 3 * width * y;
-    const end = start + 3 * width;
-    for (let to = start, from = (y / step) * rowLength; to < end; from += 3) {
-      const [r, g, b] = [halves[from], halves[from + 1], halves[from + 2]];
-      for (let k = 0; k < step && to < end; k++, to += 3) {
-        whole[to] = r;
-        whole[to + 1] = g;
-        whole[to + 2] = b;
-      }
-    }
-    for (let k = 1; k < step && y + k < height; k++)
-      whole.copyWithin(start + 3 * width * k, start, end);
-  }
-  return whole;
-}
-
 function decodeAll() {
   const values = new Float32Array(65536);
   for (let bits = 0; bits < 65536; bits++) {

@@ -5,8 +5,7 @@ import { SRGB } from './view_transform.js';
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
 /** An array. float16: bits of halves in a Uint16Array (see half_floats.js).
  * @typedef {{data: Data, shape: number[]}} Picture */
-/** @typedef {import("./view_transform.js").Lut} Lut */
-/** @typedef {import("./view_transform.js").Shaper} Shaper */
+/** @import { Lut, Shaper } from './view_transform.js' */
 
 /** @param {string} name of the transform @param {Picture} picture float16 @param {Shaper} shaper
  * @returns {Lut} */

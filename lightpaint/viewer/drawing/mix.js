@@ -5,10 +5,8 @@ import { VALUES } from './half_floats.js';
  * @typedef {{halves: Uint16Array | null, scale: number, step: number}} Plane (h, w, 3), light at
  *   unit emission over scale */
 
-/**
- * The mix of planes with weights, at every step-th pixel of every step-th row. If possible, an update
- * adds only planes whose weights have changed.
- */
+/** The mix of planes with weights, at every step-th pixel of every step-th row. If possible, an update
+ * adds only planes whose weights have changed. */
 export class Mix {
   /** @param {[height: number, width: number]} size */
   constructor(size) {
@@ -22,24 +20,9 @@ export class Mix {
     this.halfLight = new Float32Array(0);
   }
 
-  /** Height and width of the mix. @param {number} step */
-  sizeAt(step) {
-    return this.size.map((n) => Math.ceil(n / step));
-  }
-
   /** (h, w, 3) linear, at the step of the last update. */
   get light() {
     return this.step === 1 ? this.fullLight : this.halfLight;
-  }
-
-  /** Return the least step, a multiple of the steps of all planes that shine, of at least `step`.
-   * @param {Plane[]} planes @param {number} step */
-  stepFor(planes, step) {
-    const { weights } = this;
-    const isOn = (/** @type {number} */ k) =>
-      weights[3 * k] || weights[3 * k + 1] || weights[3 * k + 2];
-    const own = planes.reduce((most, plane, k) => (isOn(k) ? Math.max(most, plane.step) : most), 1);
-    return own * Math.ceil(step / own);
   }
 
   /** Note that planes have changed. */
@@ -48,7 +31,7 @@ export class Mix {
   }
 
   /** Update the mix. live: whether to update sums incrementally, which accumulates round-off.
-   * @param {Plane[]} planes @param {number} step as `stepFor` returns it @param {boolean} live
+   * @param {Plane[]} planes @param {number} step as `stepFor` in coarse_planes.js returns it @param {boolean} live
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
     const weights = this.weights;
@@ -56,22 +39,14 @@ export class Mix {
     const isSame = previous !== null && weights.every((w, i) => w === previous[i]);
     if (isSame && (live || this.isExact)) return false;
     const changedPlanes = previous
-      ? planes
-          .map((_, k) => k)
-          .filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== previous[3 * k + c]))
+      ? [...planes.keys()].filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== previous[3 * k + c]))
       : [];
     this.step = step;
     const isIncremental = live && previous !== null && 2 * changedPlanes.length <= planes.length;
     if (isIncremental) {
       const differences = weights.map((w, i) => w - previous[i]);
       this.add(planes, changedPlanes, differences, false);
-    } else
-      this.add(
-        planes,
-        planes.map((_, k) => k),
-        weights,
-        true,
-      );
+    } else this.add(planes, [...planes.keys()], weights, true);
     this.isExact = !isIncremental;
     this.appliedWeights = weights.slice();
     return true;
@@ -80,7 +55,7 @@ export class Mix {
   /** @param {Plane[]} planes @param {number[]} indices @param {Float64Array} weights
    * @param {boolean} startsFromBlack */
   add(planes, indices, weights, startsFromBlack) {
-    const [height, width] = this.sizeAt(this.step);
+    const [height, width] = this.size.map((length) => Math.ceil(length / this.step));
     const name = this.step === 1 ? 'fullLight' : 'halfLight';
     if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
     const terms = [];

@@ -2,7 +2,7 @@
 import { MAX_HALF } from './half_floats.js';
 import { SRGB } from './view_transform.js';
 
-/** @typedef {import("./view.js").Region} Region */
+/** @import { Region } from './view.js' */
 
 /** The half that is 1. */
 const HALF_ONE = 0x3c00;

@@ -8,7 +8,7 @@
 
 /** Rows and columns of the picture, ends not included.
  * @typedef {[top: number, bottom: number, left: number, right: number]} Region */
-/** @typedef {import("./view_transform.js").Shaper} Shaper */
+/** @import { Lut } from './view_transform.js' */
 
 /** The painting; the mix of the planes with the weights; the mix with other weights (another
  * look); a picture that was set by name.
@@ -16,8 +16,7 @@
 /** missed: where the solution differs from the painting; beyond: what no lighting reaches.
  * @typedef {null | 'missed' | 'beyond' | 'falsecolor' | 'importance'} Overlay */
 
-/**
- * What is drawn. left, right: the pictures. layout: side by side (or stacked, if they are larger
+/** What is drawn. left, right: the pictures. layout: side by side (or stacked, if they are larger
  * so), the left one in front up to the wipe, one alone (blink: 'left' or 'right'), or one (large)
  * with all of the other small in a corner. zoom: 1 fits.
  * pan: offset of the centre, in picture pixels. stops: exposure. live: whether more frames follow
@@ -26,8 +25,7 @@
  * @typedef {{left: Kind, right: Kind, layout: 'side' | 'wipe' | 'blink' | 'inset', wipe: number,
  *   blink: 'left' | 'right', zoom: number, pan: [number, number], stops: number,
  *   overlay: Overlay, live: boolean, draftStep?: number, large?: 'left' | 'right',
- *   corner?: Corner}} Params
- */
+ *   corner?: Corner}} Params */
 /** @typedef {'top-left' | 'top-right' | 'bottom-left' | 'bottom-right'} Corner */
 
 /** @type {Readonly<Params>} */
@@ -44,8 +42,7 @@ export const DEFAULTS = Object.freeze({
   live: false,
 });
 
-/**
- * A view of pictures of one size on one canvas.
+/** A view of pictures of one size on one canvas.
  *
  * @typedef {object} PictureView
  * @property {'gl' | 'cpu'} name
@@ -60,7 +57,7 @@ export const DEFAULTS = Object.freeze({
  *   what changed, and the whole painting (h, w, 3) and importance (h, w). May keep both.
  * @property {(kind: 'verified' | 'present', halves: Uint16Array | null) => void} setPicture
  * @property {(beyond: Uint8Array | null) => void} setBeyond (h, w)
- * @property {(lut: import("./view_transform.js").Lut) => void} setLut
+ * @property {(lut: Lut) => void} setLut
  * @property {(params: Params) => void} draw
  * @property {(x: number, y: number, width: number, height: number) => Uint8Array} read
  *   RGBA truly on the canvas after the last draw, in device pixels from its top left
@@ -72,8 +69,7 @@ export const DEFAULTS = Object.freeze({
  *   linear light of the solution, maybe at reduced size; null before there is any
  * @property {() => boolean} hasLostContext whether the context lost all that was set, so that it has to be set again
  * @property {() => number} memory bytes held for pictures
- * @property {() => void} close
- */
+ * @property {() => void} close */
 
 /** Place of a picture: the pane in device pixels, device pixels per picture pixel, and the device
  * position of the picture's top left corner.

@@ -48,11 +48,9 @@ export function encoderOf(lut, stops) {
   return encoder;
 }
 
-/**
- * Computes codes of many pixels. The upper bits of a float are a piecewise linear logarithm. They
+/** Computes codes of many pixels. The upper bits of a float are a piecewise linear logarithm. They
  * index a table of codes if there is a curve, else of coordinates in the lattice. The table
- * includes the exposure.
- */
+ * includes the exposure. */
 export class Encoder {
   /** @param {Lut} lut @param {number} stops */
   constructor(lut, stops) {

@@ -6,7 +6,7 @@
  */
 import { fromChromaticity, luminance } from '../drawing/chromaticity.js';
 
-/** @typedef {import("../drawing/chromaticity.js").RGB} RGB */
+/** @import { RGB } from '../drawing/chromaticity.js' */
 /** factor: of each channel. percent: of the light that passes.
  * @typedef {{code: string, maker: string, number: string, name: string, percent: number,
  *   factor: RGB}} Gel */

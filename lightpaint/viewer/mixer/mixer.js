@@ -3,18 +3,18 @@
  *
  * Fills each `.mixer` element from the JSON in it; without scripts the element stays hidden.
  */
+
 import { luminance } from '../drawing/chromaticity.js';
 import { Encoder, SRGB } from '../drawing/view_transform.js';
 import { Mix } from '../drawing/mix.js';
-import { canvasOfSize, contextOf, drawLight } from './mixer_canvas.js';
 import { lutOf, unpackMixer } from './mixer_data.js';
 import { addGels } from './mixer_gels.js';
 import { Row, kelvinTable } from './mixer_light.js';
 import { Selection } from './mixer_selection.js';
 import { createElement, createSlider, followDrag } from './page_elements.js';
 
-/** @typedef {import("./mixer_data.js").Data} Data */
-/** @typedef {import("../drawing/colour.js").RGB} RGB */
+/** @import { Data, Unpacked } from './mixer_data.js' */
+/** @import { RGB } from '../drawing/colour.js' */
 
 /** A look from which a mixer begins. start: returns its data from the data of its basis.
  * @typedef {{start: (data: Data) => Data}} Look */
@@ -23,7 +23,7 @@ import { createElement, createSlider, followDrag } from './page_elements.js';
 const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
 
 class Mixer {
-  /** @param {HTMLElement} root @param {import("./mixer_data.js").Unpacked} unpacked
+  /** @param {HTMLElement} root @param {Unpacked} unpacked
    * @param {import("../drawing/view_transform.js").Lut} lut */
   constructor(root, [data, planes, gels], lut) {
     this.data = data;
@@ -68,13 +68,13 @@ class Mixer {
     const [height, width] = this.data.size;
     const { painting } = this.data;
     const view = createElement('div', 'mixer-view');
-    const createStage = createElement('div', 'mixer-stage wipe-stage');
-    createStage.style.aspectRatio = `${width} / ${height}`;
+    const stage = createElement('div', 'mixer-stage wipe-stage');
+    stage.style.aspectRatio = `${width} / ${height}`;
     this.picture.className = 'mixer-mix';
     this.picture.setAttribute('role', 'img');
     this.picture.ariaLabel = 'The mix of the lights';
-    createStage.append(this.picture);
-    view.append(createStage);
+    stage.append(this.picture);
+    view.append(stage);
     if (!painting) return view;
     const image = createElement('img', 'mixer-painting');
     image.src = painting;
@@ -82,18 +82,18 @@ class Mixer {
     image.draggable = false;
     const edge = createElement('div', 'wipe-edge');
     edge.append(createElement('i'));
-    createStage.append(image, edge, createElement('span', 'wipe-tag', 'painting'));
-    createStage.append(createElement('span', 'wipe-tag is-right', 'mix'));
+    stage.append(image, edge, createElement('span', 'wipe-tag', 'painting'));
+    stage.append(createElement('span', 'wipe-tag is-right', 'mix'));
     // The whole mix is visible until the wipe moves, since a light may affect only one half.
     const wipe = createSlider('Wipe: how much of the painting', 0, 100);
     wipe.value = '0';
     const move = () => {
-      createStage.style.setProperty('--p', `${wipe.value}%`);
-      createStage.classList.toggle('is-mix', Number(wipe.value) < 1);
-      createStage.classList.toggle('is-painting', Number(wipe.value) > 99);
+      stage.style.setProperty('--p', `${wipe.value}%`);
+      stage.classList.toggle('is-mix', Number(wipe.value) < 1);
+      stage.classList.toggle('is-painting', Number(wipe.value) > 99);
     };
     wipe.addEventListener('input', move);
-    followDrag(createStage, (share) => {
+    followDrag(stage, (share) => {
       wipe.value = String(100 * share);
       move();
     });
@@ -108,8 +108,8 @@ class Mixer {
   createButtons() {
     this.status = createElement('p', 'mixer-said');
     this.status.setAttribute('role', 'status');
-    const createButtons = createElement('div', 'mixer-buttons');
-    createButtons.append(
+    const buttons = createElement('div', 'mixer-buttons');
+    buttons.append(
       createButton('Reset to answer', 'All lights as in the answer', () => this.reset('answer')),
       createButton('Reset to now', 'All lights as in the scene', () => this.reset('present')),
       createButton(
@@ -120,14 +120,14 @@ class Mixer {
     );
     const { command } = this.data;
     if (command)
-      createButtons.append(
+      buttons.append(
         createButton('Copy command', command, () => this.copy(command, 'The command')),
       );
     this.text = createElement('textarea', 'mixer-text');
     this.text.readOnly = true;
     this.text.hidden = true;
     this.text.ariaLabel = 'To copy by hand';
-    return [createButtons, this.status, this.text];
+    return [buttons, this.status, this.text];
   }
 
   /** @param {'answer' | 'present'} look */
@@ -146,10 +146,10 @@ class Mixer {
   /** Weights of all planes, (n, 3), under solo and mute. */
   currentWeights() {
     const isSolo = this.rows.some((row) => row.isSolo);
-    const currentWeights = new Float64Array(3 * this.planes.length);
+    const weights = new Float64Array(3 * this.planes.length);
     if (!isSolo)
       for (const k of this.hiddenLights())
-        currentWeights.set(this.dimmed(this.data.lights[k][this.look]), 3 * k);
+        weights.set(this.dimmed(this.data.lights[k][this.look]), 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
       // Joint lights have a plane per look; the last reset chose it.
@@ -157,10 +157,10 @@ class Mixer {
       const rgb = row.light.isFixed ? row.rgb : this.dimmed(row.rgb);
       if (!isOn) continue;
       for (const k of row.light.joint?.members ?? [])
-        currentWeights.set(product(this.data.lights[k][this.look], rgb), 3 * k);
-      if (!row.light.joint?.members) currentWeights.set(rgb, 3 * plane);
+        weights.set(product(this.data.lights[k][this.look], rgb), 3 * k);
+      if (!row.light.joint?.members) weights.set(rgb, 3 * plane);
     }
-    return currentWeights;
+    return weights;
   }
 
   /** Lights with a plane but without sliders. @returns {number[]} */
@@ -168,7 +168,7 @@ class Mixer {
     const { shown, lights, joint } = this.data;
     if (!shown) return [];
     const rows = [...shown, ...joint.flatMap(({ members }) => members ?? [])];
-    return lights.map((_, k) => k).filter((k) => !rows.includes(k));
+    return [...lights.keys()].filter((k) => !rows.includes(k));
   }
 
   draw() {
@@ -299,3 +299,25 @@ function failureText(error) {
 
 for (const root of document.querySelectorAll('.mixer:not([data-ready])'))
   if (root instanceof HTMLElement) begin(root);
+
+/** Draw light on a canvas of its size. @param {HTMLCanvasElement} canvas
+ * @param {Float32Array} light @param {Encoder} encoder */
+function drawLight(canvas, light, encoder) {
+  const image = new ImageData(canvas.width, canvas.height);
+  encoder.pixels(light, image.data, 0, canvas.width * canvas.height);
+  contextOf(canvas).putImageData(image, 0, 0);
+}
+
+/** @param {[height: number, width: number]} size */
+function canvasOfSize([height, width]) {
+  const canvas = document.createElement('canvas');
+  Object.assign(canvas, { width, height });
+  return canvas;
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function contextOf(canvas) {
+  const context = canvas.getContext('2d', { alpha: false });
+  if (!context) throw new Error('no canvas to draw on');
+  return context;
+}

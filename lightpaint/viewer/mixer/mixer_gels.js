@@ -4,9 +4,9 @@ import { luminance } from '../drawing/chromaticity.js';
 import { filtered, findGels, gelName, lossInStops } from '../gels/gels.js';
 import { createElement } from './page_elements.js';
 
-/** @typedef {import("../drawing/chromaticity.js").RGB} RGB */
-/** @typedef {import("./mixer_light.js").Row} Row */
-/** @typedef {import("../gels/gels.js").Gel} Gel */
+/** @import { RGB } from '../drawing/chromaticity.js' */
+/** @import { Row } from './mixer_light.js' */
+/** @import { Gel } from '../gels/gels.js' */
 
 /** Share of its light that a filter lets through, and the colour that it gives, by row.
  * @type {WeakMap<Row, {passed: number, hue: RGB}>} */

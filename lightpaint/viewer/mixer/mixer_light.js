@@ -5,7 +5,7 @@ import { decodeSrgb, encodeSrgb } from '../drawing/view_transform.js';
 import { slideByTouch } from '../touch_sliders.js';
 import { createElement, createSlider } from './page_elements.js';
 
-/** @typedef {import("../drawing/colour.js").RGB} RGB */
+/** @import { RGB } from '../drawing/colour.js' */
 /** kelvin: if the look's colour is white, else null.
  * joint: lights that share this row.
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean,

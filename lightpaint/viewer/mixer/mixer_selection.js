@@ -3,8 +3,8 @@
 import { slideByTouch } from '../touch_sliders.js';
 import { createElement, createSlider } from './page_elements.js';
 
-/** @typedef {import("../drawing/colour.js").RGB} RGB */
-/** @typedef {import("./mixer_light.js").Row} Row */
+/** @import { RGB } from '../drawing/colour.js' */
+/** @import { Row } from './mixer_light.js' */
 
 /** Ends of the sliders: of the master in percent, of the others in stops and mireds. */
 const [MASTER_MAX, DIM_RANGE, WARM_RANGE] = [200, 4, 100];

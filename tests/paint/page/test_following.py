@@ -6,7 +6,7 @@ from typing import Any
 def test_drafts_become_coarser_until_ten_answers_a_second_come(page: Any):
     steps = page.evaluate(
         """async () => {
-          const { DraftPace } = await import('/ui/draft_pace.js');
+          const { DraftPace } = await import('/ui/lamp_moves.js');
           const run = (period, count, minStep) => {
             const pace = new DraftPace();
             for (let k = 0; k < count; k++) {
@@ -25,7 +25,7 @@ def test_drafts_become_coarser_until_ten_answers_a_second_come(page: Any):
 def test_a_draft_repeats_its_pixels(page: Any):
     whole = page.evaluate(
         """async () => {
-          const { repeatPixels } = await import('/viewer/drawing/half_floats.js');
+          const { repeatPixels } = await import('/viewer/drawing/coarse_planes.js');
           const halves = Uint16Array.from({ length: 18 }, (_, k) => k);
           return [...repeatPixels(halves, 2, [3, 5])];
         }"""
@@ -125,7 +125,7 @@ def test_a_change_that_can_wait_is_shown_with_the_next_or_soon(page: Any):
 
 LOADS = """async ({ isDropped }) => {
   const { PictureLoader } = await import('/engine/picture_loader.js');
-  const { LightDrafts } = await import('/engine/light_drafts.js');
+  const { LightDrafts } = await import('/engine/session_mirror.js');
   const fetched = [], used = [];
   const host = { fetch: async (name) => (fetched.push(name), { data: new Uint16Array(3) }) };
   const loader = new PictureLoader(host, (...fields) => used.push(fields.slice(0, 2)), () => {});

@@ -366,7 +366,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
 
 @pytest.mark.nightly
 def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
-    painter.page.evaluate("() => painter.session.tie('key', 'cove')")
+    painter.page.evaluate("() => painter.session.tie(['key', 'cove'])")
     painter.still()
     key, cove = (
         painter.page.get_by_role("group", name=name, exact=True) for name in ("key", "cove")
@@ -493,7 +493,7 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(
-        "async () => (await import('/ui/paint_colour.js')).fromKelvin(2700)",
+        "async () => (await import('/viewer/drawing/colour.js')).fromKelvin(2700)",
     )
     np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
 

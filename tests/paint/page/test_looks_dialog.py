@@ -79,7 +79,7 @@ def test_a_difference_in_words(page: Any, first: Any, second: Any, text: str) ->
 def test_warmth_differs_in_mired(page: Any) -> None:
     whites = page.evaluate(
         """async () => {
-          const { fromKelvin, luminance } = await import('/ui/paint_colour.js');
+          const { fromKelvin, luminance } = await import('/viewer/drawing/colour.js');
           return [5000, 4000].map((kelvin) => {
             const rgb = fromKelvin(kelvin);
             return rgb.map((x) => x / luminance(rgb));

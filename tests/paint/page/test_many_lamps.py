@@ -124,7 +124,7 @@ def test_warmth_keeps_the_level_and_moves_by_mireds(painter: Painter) -> None:
     painter.type("Warm by", "60")
     locks = last_locks(painter)
     kelvins = painter.page.evaluate(
-        "async (colours) => { const { toKelvin } = await import('/ui/paint_colour.js');"
+        "async (colours) => { const { toKelvin } = await import('/viewer/drawing/colour.js');"
         " return colours.map((rgb) => toKelvin(rgb).kelvin) }",
         [before[1].tolist(), locks["window left"].tolist()],
     )

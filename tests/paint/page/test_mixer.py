@@ -404,7 +404,7 @@ def test_twelve_lights_of_noise_can_be_mailed(make_basis: Any) -> None:
 
 
 def _unpack(packed: PackedPicture) -> Any:
-    """The picture (h, w, 3) of packed data, pixel by pixel as in `packed_picture.js`."""
+    """The picture (h, w, 3) of packed data, pixel by pixel as in `mixer_data.js`."""
     height, width = packed.size
     data = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int32)
     folded = (data[: data.size // 2] | data[data.size // 2 :] << 8).reshape(3, height, width)

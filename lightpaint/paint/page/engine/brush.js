@@ -2,8 +2,8 @@
  * Brush strokes as round stamps along a path. Positions and sizes are in pixels of the picture.
  */
 
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @import { Region } from '../../../viewer/drawing/view.js' */
+/** @import { PaintCanvas } from './paint_canvas.js' */
 /** @typedef {{x: number, y: number, pressure: number}} Point */
 /** size: diameter. hardness: fully covered part of the radius. flow: coverage of one stamp at full
  * pressure.

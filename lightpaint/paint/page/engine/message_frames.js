@@ -9,18 +9,14 @@
 /** Version of this protocol. */
 export const VERSION = 3;
 
-/** @typedef {import("../../../viewer/drawing/lattice.js").Data} Data */
-/** @typedef {import("../../../viewer/drawing/lattice.js").Picture} Picture */
+/** @import { Data, Picture } from '../../../viewer/drawing/lattice.js' */
+/** @import { LightInfo as Light } from './messages.js' */
 /** @typedef {Record<string, Picture>} Arrays */
-/** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
-/** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */
 
 /** A received message: its fields together with its arrays.
  * @typedef {{kind: string, seq?: number, reply?: number, arrays: Arrays, [field: string]: any}}
  * Message */
 
-/** @typedef {import("./messages.js").LightInfo} Light */
-/** @typedef {import("../../../viewer/drawing/view_transform.js").Shaper} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} BufferInfo */
 

@@ -1,8 +1,8 @@
 /** The tint that makes what is painted around a place neutral. */
 import { luminance } from '../../../viewer/drawing/colour.js';
 
-/** @typedef {import("./brush.js").Point} Point */
-/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @import { Point } from './brush.js' */
+/** @import { RGB } from '../../../viewer/drawing/colour.js' */
 
 /** Diameter of the sampled disc, as a part of the height of the picture, and its least in pixels. */
 const [SAMPLE_SHARE, MIN_DIAMETER] = [0.02, 3];
@@ -28,12 +28,10 @@ export function pixelsAround(image, [height, width], { x, y }) {
   return pixels;
 }
 
-/**
- * Return the tint of an adjustment that makes the mean of pixels neutral. The adjustment keeps the
+/** Return the tint of an adjustment that makes the mean of pixels neutral. The adjustment keeps the
  * luminance of each pixel, so that of an uneven area the tint is found in steps.
  * @param {RGB[]} pixels linear light @returns {RGB | null} of luminance 1; null where the light is
- * black, or of fewer than three channels
- */
+ * black, or of fewer than three channels */
 export function neutralTint(pixels) {
   /** @type {RGB} */
   let tint = [1, 1, 1];

@@ -3,10 +3,9 @@ import { UNQUEUED, Emitter } from './socket_host.js';
 import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./socket_host.js").Host} Host */
-/** @typedef {import("./message_frames.js").Arrays} Arrays */
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./message_frames.js").Picture} Picture */
+/** @import { Host } from './socket_host.js' */
+/** @import { Arrays, Message } from './message_frames.js' */
+/** @import { Picture } from '../../../viewer/drawing/lattice.js' */
 
 /** The part of anywidget's model that is used.
  * @typedef {{get: (name: string) => unknown,

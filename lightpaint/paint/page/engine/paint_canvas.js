@@ -10,9 +10,9 @@ import { pixelChange } from './stroke_effects.js';
 import { VALUES, toFloats } from '../../../viewer/drawing/half_floats.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./selection/selection_mirror.js").Selection} Selection */
-/** @typedef {import("./stroke_effects.js").Effect} Effect */
+/** @import { Region } from '../../../viewer/drawing/view.js' */
+/** @import { Selection } from './selection/selection_mirror.js' */
+/** @import { Effect } from './stroke_effects.js' */
 
 /** Pixels before a stroke, (s, s, 3) and (s, s), and the stroke's coverage.
  * @typedef {{top: number, left: number, image: Float32Array, importance: Float32Array,
@@ -89,19 +89,15 @@ export class PaintCanvas {
     this.setCoveredShare(0);
   }
 
-  /**
-   * Set the part of the picture that the stroke covers, as far as is known. Over a fully painted
+  /** Set the part of the picture that the stroke covers, as far as is known. Over a fully painted
    * picture (darkened as a whole, say) a stroke should have the same effect as over an unpainted
-   * one, whose rest is held. @param {number} part
-   */
+   * one, whose rest is held. @param {number} part */
   setCoveredShare(part) {
     this.strokeImportance = this.isFullyPainted ? accent(part) : 1;
   }
 
-  /**
-   * Mark the stroke as covering everything. Earlier strokes keep the effect that they had while the
-   * rest was held.
-   */
+  /** Mark the stroke as covering everything. Earlier strokes keep the effect that they had while the
+   * rest was held. */
   setFullyCovered() {
     const total = this.importance.reduce((sum, x) => sum + x, 0);
     this.importanceFactor = this.isFullyPainted ? 1 : accent(total / this.importance.length);

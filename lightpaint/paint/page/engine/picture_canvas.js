@@ -2,9 +2,7 @@
 import { chooseView } from '../../../viewer/drawing/choose_renderer.js';
 import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 
-/** @typedef {import("../../../viewer/drawing/view.js").PictureView} PictureView */
-/** @typedef {import("../../../viewer/drawing/view.js").Params} Params */
-/** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
+/** @import { Kind, Pane, Params, PictureView } from '../../../viewer/drawing/view.js' */
 
 /** Milliseconds without changes before a quick draft is redrawn sharply. */
 const DRAFT_PAUSE_MS = 180;
@@ -185,7 +183,7 @@ export class Screen {
   }
 
   /** Return the picture shown in place of another.
-   * @param {import('../../../viewer/drawing/view.js').Kind} kind */
+   * @param {Kind} kind */
   substitute(kind) {
     return kind === 'solution' && this.isPresent ? 'present' : kind;
   }

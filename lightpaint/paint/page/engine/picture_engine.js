@@ -1,13 +1,11 @@
 /**
- * The picture engine, which implements `Engine` of ui/engine_interface.js.
- *
- * It holds the painting, shows the pictures, turns pointer input into strokes, and follows the
+ * The picture engine. It holds the painting, shows the pictures, turns pointer input into strokes, and follows the
  * pixels and weights that the session sends.
  */
+
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
 import { neutralTint, pixelsAround } from './neutral.js';
-import { sampledLight } from './displayed_codes.js';
 import { DEFAULT_TOOL, LABELS, Stroke, adjustArea, tintArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
 import { CpuView } from '../../../viewer/drawing/cpu.js';
@@ -21,14 +19,12 @@ import { LayerStrokes } from './layers/layer_strokes.js';
 import { Selections } from './selection/selections.js';
 import { SessionMirror } from './session_mirror.js';
 
-/** @typedef {import("./brush.js").Point} Point */
-/** @typedef {import("./stroke.js").ToolSettings} ToolSettings */
-/** @typedef {import("./socket_host.js").Host} Host */
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./messages.js").ChangeLayers} ChangeLayers */
-/** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
-/** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
+/** @import { Point } from './brush.js' */
+/** @import { ToolSettings } from './stroke.js' */
+/** @import { Host } from './socket_host.js' */
+/** @import { Kind, Pane, Region } from '../../../viewer/drawing/view.js' */
+/** @import { ChangeLayers } from './messages.js' */
+/** @import { RGB } from '../../../viewer/drawing/colour.js' */
 
 /** Albedo below which a surface is black and shows no light. */
 const MIN_ALBEDO = 0.02;
@@ -51,7 +47,13 @@ export function openEngine(host, options = {}) {
   return new PictureEngine(host, { view });
 }
 
-class PictureEngine extends Emitter {
+/** What draws and paints for the interface. It emits "message": an answer to a stroke; "frame": before it
+ * draws; "probed": when the light under the pointer has come; "loading": {done, total, isFirst} pictures,
+ * where some of the lights have none yet; "adjustment": {stops, mired} of a drag; "layers": {} when
+ * `layerState` has changed; "selection": {} when another part is selected; "view": {view} in which
+ * something was undone; "lost": {count, isStale} strokes that are not sent any more, since another page has
+ * painted meanwhile, or the session is there no more; "trouble": {text}. */
+export class PictureEngine extends Emitter {
   /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
   constructor(host, { view }) {
     super();
@@ -216,7 +218,7 @@ class PictureEngine extends Emitter {
   }
 
   /** @param {'painting' | 'solution' | 'present'} kind
-   * @returns {import("./displayed_codes.js").LightSource | null} */
+   * @returns {LightSource | null} */
   lightOf(kind) {
     const { canvas, drawnPainting, isReady } = this.mirror;
     if (!isReady || !canvas || !drawnPainting) return null;
@@ -479,4 +481,29 @@ class PictureEngine extends Emitter {
     this.screen.close();
     this.element.remove();
   }
+}
+
+/** Light of a picture: values of pixels, row by row, each of some channels; `isHalf`: by the table of
+ * halves. @typedef {{data: ArrayLike<number>, width: number, height: number, channels: number,
+ *   isHalf?: boolean}} LightSource */
+
+/** Largest number of columns that are looked at. */
+const MAX_COLUMNS = 384;
+
+/** Return the light of every so manieth pixel of every so manieth row. @param {LightSource} source
+ * @param {number} [maxColumns] @returns {{light: Float32Array, width: number, height: number}} */
+function sampledLight({ data, width, height, channels, isHalf }, maxColumns = MAX_COLUMNS) {
+  const step = Math.max(1, Math.ceil(width / maxColumns));
+  const size = [Math.ceil(width / step), Math.ceil(height / step)];
+  const light = new Float32Array(3 * size[0] * size[1]);
+  let target = 0;
+  for (let y = 0; y < height; y += step)
+    for (let x = 0; x < width; x += step, target += 3) {
+      const start = channels * (y * width + x);
+      for (let c = 0; c < 3; c++) {
+        const value = data[start + c];
+        light[target + c] = isHalf ? VALUES[value] : value;
+      }
+    }
+  return { light, width: size[0], height: size[1] };
 }

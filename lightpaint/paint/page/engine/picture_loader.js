@@ -5,7 +5,7 @@
  * at a time, and none twice.
  */
 
-/** @typedef {import("./message_frames.js").Picture} Picture */
+/** @import { Picture } from '../../../viewer/drawing/lattice.js' */
 
 /** Concurrent fetches. */
 const MAX_FETCHES = 4;

@@ -1,16 +1,16 @@
 /** The pictures of the session that a page needs, and the slot of its view that each fills. */
 import { nameInView } from './message_frames.js';
 
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @import { Message } from './message_frames.js' */
+/** @import { RGB } from '../../../viewer/drawing/colour.js' */
 
-/**
- * Settings of the display. gains: the lights to display, null for all. instead, other: weights with
- * which to show the solution and the other mix.
+/** Settings of the display. visibleLights: those that solo and mute leave; null for all. solutionWeights,
+ * otherWeights: weights for "solution" and "other", of the lights and maybe of two looks; null for the
+ * answer's. lookPictures: ids of these looks, if their lights hang elsewhere. lookMixes: weights of each of
+ * the looks that are side by side. master: factor of the answer's weights, but for fixed lights.
  * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
  *   visibleLights: boolean[] | null, solutionWeights: RGB[] | null, otherWeights: RGB[] | null,
- *   lookPictures: (number | null)[] | null, lookMixes?: RGB[][] | null, master?: number}} Display
- */
+ *   lookPictures: (number | null)[] | null, lookMixes?: RGB[][] | null, master?: number}} Display */
 
 /** Number of looks that are compared at a time. Their pictures are planes behind the lights' planes. */
 export const COMPARED_COUNT = 4;
@@ -18,13 +18,11 @@ export const COMPARED_COUNT = 4;
 /** Pictures that a page always shows or uses, by name. */
 const SHARED_PICTURES = ['present', 'albedo', 'objects', 'verified', 'beyond'];
 
-/**
- * Return the name of the picture for each slot, null for none: clean planes where there are any and
+/** Return the name of the picture for each slot, null for none: clean planes where there are any and
  * they are shown, else raw ones.
  * @param {number} count of lights @param {Display | null} display @param {number} view
  * @param {Record<string, number>} resources
- * @returns {[slot: string, name: string | null][]}
- */
+ * @returns {[slot: string, name: string | null][]} */
 export function wantedPictures(count, display, view, resources) {
   const isClean = display?.clean ?? true;
   /** @type {[slot: string, name: string | null][]} */

@@ -4,12 +4,12 @@ import { SRGB } from '../../../viewer/drawing/view_transform.js';
 import { COMPARED_COUNT, showsPresent } from './picture_slots.js';
 import { MIX_SLOTS, OTHER_SLOT, SOLUTION_SLOT, WALL_SLOT, SessionMixes } from './session_mixes.js';
 
-/** @typedef {import("../../../viewer/drawing/view_transform.js").Lut} Lut */
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
-/** @typedef {import("./picture_canvas.js").Screen} Screen */
-/** @typedef {import("./picture_slots.js").Display} Display */
+/** @import { Lut } from '../../../viewer/drawing/view_transform.js' */
+/** @import { Message } from './message_frames.js' */
+/** @import { Region } from '../../../viewer/drawing/view.js' */
+/** @import { PaintCanvas } from './paint_canvas.js' */
+/** @import { Screen } from './picture_canvas.js' */
+/** @import { Display } from './picture_slots.js' */
 
 export class PictureState {
   /** @param {Screen} screen @param {import("./socket_host.js").Host} host */

@@ -1,8 +1,8 @@
 /**
  * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
+
 import { LayerMirror } from './layers/layer_mirror.js';
-import { LightDrafts } from './light_drafts.js';
 import { PaintCanvas } from './paint_canvas.js';
 import { PictureLoader } from './picture_loader.js';
 import { PictureState } from './picture_state.js';
@@ -12,14 +12,14 @@ import { VERSION, nameInView, stateOfView } from './message_frames.js';
 import { COMPARED_COUNT, showsPresent, sizesText, wantedPictures } from './picture_slots.js';
 import { SOLUTION_SLOT } from './session_mixes.js';
 import { StrokeSender } from './stroke_sender.js';
+import { repeatPixels } from '../../../viewer/drawing/coarse_planes.js';
 
-/** @typedef {import("./socket_host.js").Host} Host */
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./message_frames.js").Picture} Picture */
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {import("./picture_canvas.js").Screen} Screen */
-/** @typedef {import("./picture_slots.js").Display} Display */
+/** @import { Host } from './socket_host.js' */
+/** @import { Message } from './message_frames.js' */
+/** @import { Picture } from '../../../viewer/drawing/lattice.js' */
+/** @import { Region } from '../../../viewer/drawing/view.js' */
+/** @import { Screen } from './picture_canvas.js' */
+/** @import { Display } from './picture_slots.js' */
 
 export class SessionMirror extends PictureState {
   /** @param {Host} host @param {Screen} screen
@@ -325,5 +325,41 @@ export class SessionMirror extends PictureState {
     this.showWeights();
     if (showsPresent(display) !== showsPresent(previous)) this.showPresent();
     this.screen.requestDraw();
+  }
+}
+
+export class LightDrafts {
+  /** Drafts by slot. @type {Map<string, {name: string, picture: Picture}>} */
+  waiting = new Map();
+
+  /** @param {PictureLoader} loader */
+  constructor(loader) {
+    this.loader = loader;
+  }
+
+  /** Keep a draft until its answer. The message about all new pictures comes before that: nothing
+   * is fetched that is here.
+   * @param {import("./messages.js").Events["dragged"]} draft
+   * @param {[height: number, width: number]} size of the planes */
+  add({ light, step, resources, arrays }, size) {
+    const slot = `plane ${light}`;
+    const name = this.loader.notePicture(slot, resources);
+    if (name === null) return;
+    const halves = /** @type {Uint16Array} */ (arrays.data.data);
+    const data = repeatPixels(halves, step, size);
+    this.waiting.set(slot, { name, picture: { ...arrays.data, data } });
+  }
+
+  /** Show the drafts that wait. */
+  show() {
+    for (const [slot, { name, picture }] of this.waiting)
+      this.loader.use(slot, name, picture, true);
+    this.waiting.clear();
+  }
+
+  /** Drop the drafts that wait, since all pictures are listed anew. */
+  clear() {
+    this.loader.forget((slot) => this.waiting.has(slot));
+    this.waiting.clear();
   }
 }

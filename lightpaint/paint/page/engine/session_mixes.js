@@ -6,12 +6,13 @@
  * one in flight for each slot; the exact picture comes after a pause without changes.
  */
 import { nameInView } from './message_frames.js';
-import { repeatPixels, toFloats } from '../../../viewer/drawing/half_floats.js';
+import { repeatPixels } from '../../../viewer/drawing/coarse_planes.js';
+import { toFloats } from '../../../viewer/drawing/half_floats.js';
 import { COMPARED_COUNT } from './picture_slots.js';
 
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./picture_canvas.js").Screen} Screen */
-/** @typedef {import("./socket_host.js").Host} Host */
+/** @import { Message } from './message_frames.js' */
+/** @import { Screen } from './picture_canvas.js' */
+/** @import { Host } from './socket_host.js' */
 /** number: of the last lighting; shown: of the lighting whose picture is here. isBusy: whether a draft
  * is in flight; isNew: whether the next has been asked for. halves: the picture, of every step-th
  * pixel of every step-th row.

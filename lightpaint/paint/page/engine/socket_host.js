@@ -8,14 +8,11 @@ import { AccessKey, PROTOCOL, REFUSALS, authorization } from './access_key.js';
 import { VERSION, encodeFrame, pictureOf, decodeFrame } from './message_frames.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./message_frames.js").Arrays} Arrays */
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./messages.js").Requests} Requests */
-/** @typedef {import("./messages.js").Events} Events */
-/** @typedef {import("./message_frames.js").Picture} Picture */
+/** @import { Arrays, Message } from './message_frames.js' */
+/** @import { Events, Requests } from './messages.js' */
+/** @import { Picture } from '../../../viewer/drawing/lattice.js' */
 
-/**
- * The page's link to its session. `on` hears messages of a kind, asked for or not, and `connection`
+/** The page's link to its session. `on` hears messages of a kind, asked for or not, and `connection`
  * with {state: 'open' | 'lost' | 'stale'}; stale: the server runs, but does not know this page; and
  * `silence` with {isSilent} when an answer is late. `send` is answered by the reply, which may be
  * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
@@ -25,8 +22,7 @@ import { t } from '../language/language.js';
  * @property {<K extends keyof HostEvents>(kind: K, listener: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
- * @property {() => Promise<void>} [gate] is waited for before messages that follow strokes
- */
+ * @property {() => Promise<void>} [gate] is waited for before messages that follow strokes */
 
 /** Messages to a page: from the session, and from its host about the connection.
  * @typedef {Events & {connection: {kind: 'connection', state: 'open' | 'lost' | 'stale'},

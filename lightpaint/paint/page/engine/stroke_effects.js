@@ -1,22 +1,20 @@
 /** Effects of strokes on the pixels that they cover. */
+
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
 
-/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
-/** @typedef {import("./paint_canvas.js").Tile} Tile */
-/** @typedef {import("./whole_adjustment.js").WholeAdjustment} WholeAdjustment */
-/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @import { PaintCanvas, Tile } from './paint_canvas.js' */
+/** @import { WholeAdjustment } from './stroke.js' */
+/** @import { RGB } from '../../../viewer/drawing/colour.js' */
 
-/**
- * The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo.
+/** The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo.
  * Surfaces without diffuse reflection, such as a flame, ignore light and keep their pixels. erase:
  * the pixel shows the current look again, unpainted; in a picture that was adjusted as a whole, it
  * shows that adjustment. weigh: its importance is multiplied by `times`; an unpainted pixel keeps
  * its look, with the importance of a stroke. adjust: its luminance is multiplied by `gain` and its
  * colour by `tint`.
  * @typedef {{kind: 'paint', rgb: RGB, paintMode: 'light' | 'colour'} | {kind: 'erase', ground: WholeAdjustment | null} |
- *   {kind: 'weigh', factor: number} | {kind: 'adjust', gain: number, tint: RGB}} Effect
- */
+ *   {kind: 'weigh', factor: number} | {kind: 'adjust', gain: number, tint: RGB}} Effect */
 
 /** Lower and upper bound of importance under repeated changes. */
 const [MIN_IMPORTANCE, MAX_IMPORTANCE] = [0.01, 1000];

@@ -7,14 +7,11 @@
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { plainLayer } from './layers/layer_list.js';
 
-/** @typedef {import("./message_frames.js").Region} Region */
-/** @typedef {import("./message_frames.js").Arrays} Arrays */
-/** @typedef {import("./message_frames.js").Message} Message */
-/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @import { Region } from '../../../viewer/drawing/view.js' */
+/** @import { Arrays } from './message_frames.js' */
+/** @import { PaintCanvas } from './paint_canvas.js' */
+/** @import { ChangeLayers, Layer, Requests, Select } from './messages.js' */
 
-/** @typedef {import("./messages.js").Layer} Layer */
-/** @typedef {import("./messages.js").ChangeLayers} ChangeLayers */
-/** @typedef {import("./messages.js").Select} Select */
 
 /** The stroke in progress. canvas: the pixels that it paints. layerOf: returns their layer; null for
  * the painting that is always there. dirty: region not sent yet. wholeRegion: region of the stroke.
@@ -265,7 +262,7 @@ export class StrokeSender {
   }
 
   /** @template {"paint" | "drop_stroke" | "change_layers" | "select"} K @param {K} kind
-   * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
+   * @param {Requests[K]} fields @param {Arrays} arrays
    * @param {PendingStroke | null} pending what is answered with it */
   async send(kind, fields, arrays, pending) {
     this.isBusy = true;

@@ -3,7 +3,7 @@
 
 import { LANGUAGES } from './languages.js';
 
-/** @typedef {import("./languages.js").Forms} Forms */
+/** @import { Forms } from './languages.js' */
 /** @typedef {string | number | undefined} Value */
 /** The names in the braces of a sentence.
  * @template {string} S

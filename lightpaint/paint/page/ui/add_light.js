@@ -4,9 +4,7 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, NumberField, Select } from './controls.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("./ui_state.js").NewKind} NewKind */
+/** @import { App, NewKind, Ui } from './ui_state.js' */
 
 const KINDS = [
   { value: 'spot', label: t('Spot') },
@@ -38,10 +36,7 @@ export function AddLight({ ui, app }) {
   const places = [
     { value: CLICK, label: t('where I click') },
     { value: ANYWHERE, label: t('anywhere free') },
-    ...(rig?.surfaces ?? []).map((name) => ({
-      value: name,
-      label: t('on {name}', { name }),
-    })),
+    ...(rig?.surfaces ?? []).map((name) => ({ value: name, label: t('on {name}', { name }) })),
   ];
   const addOrSearch = () =>
     isClick

@@ -9,10 +9,7 @@ import { texelsText } from './lamps/light_selection.js';
 import { drawPicture } from './thumbnail.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Advice} Cause */
-/** @typedef {import("./ui_state.js").Change} Change */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { Advice as Cause, App, Change, Picture, Ui } from './ui_state.js' */
 
 /** Constraint keys of a light that each kind of advice removes. @type {Record<string, string[]>} */
 const CONSTRAINT_KEYS = {
@@ -172,7 +169,7 @@ export function PreviewDialog({ ui, app }) {
   </${Dialog}>`;
 }
 
-/** @param {{picture: import("./engine_interface.js").Picture | null, caption: string, label: string}} props */
+/** @param {{picture: Picture | null, caption: string, label: string}} props */
 function PreviewPicture({ picture, caption, label }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {

@@ -1,8 +1,7 @@
 /** The panel that shows where and why the answer differs, and verifies it with a render. */
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
-import { ProgressBar } from './progress_bar.js';
-import { Button, Choice } from './controls.js';
+import { Button, Choice, ProgressBar } from './controls.js';
 import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
@@ -12,27 +11,13 @@ import { shortcutsOf } from './key_bindings.js';
 import { luxLegend } from './planes/plane_overlay.js';
 import { SCALE_GRADIENT } from './planes/plane_picture.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("./engine_interface.js").Pane} Pane */
+/** @import { App, Pane, Ui } from './ui_state.js' */
 
 const OVERLAYS = [
   { value: null, label: t('None') },
-  {
-    value: 'missed',
-    label: t('Difference'),
-    tip: t('Where the answer differs from the painting'),
-  },
-  {
-    value: 'beyond',
-    label: t('Out of reach'),
-    tip: t('What no setting of these lights can do'),
-  },
-  {
-    value: 'falsecolor',
-    label: t('False colour'),
-    tip: t('Brightness in stops'),
-  },
+  { value: 'missed', label: t('Difference'), tip: t('Where the answer differs from the painting') },
+  { value: 'beyond', label: t('Out of reach'), tip: t('What no setting of these lights can do') },
+  { value: 'falsecolor', label: t('False colour'), tip: t('Brightness in stops') },
   {
     value: 'importance',
     label: t('Importance'),

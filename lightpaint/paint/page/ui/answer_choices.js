@@ -7,18 +7,8 @@ import { knownShares, percentOf } from './layers/layer_delivery.js';
 import { Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("../engine/messages.js").AnswerChoice} AnswerChoice */
-
-/**
- * @typedef {object} ChoiceState
- * @property {readonly AnswerChoice[]} choices the answers with other light colours
- * @property {number} choicesVersion of the session, of which they are
- */
-
-/** @type {ChoiceState} */
-export const INITIAL_CHOICES = { choices: [], choicesVersion: -1 };
+/** @import { App, Ui } from './ui_state.js' */
+/** @import { AnswerChoice, Events } from '../engine/messages.js' */
 
 /** From the least freedom of the lamps to the most. */
 const CHOICES = /** @type {const} */ ([
@@ -39,14 +29,10 @@ const CHOICES = /** @type {const} */ ([
   },
 ]);
 
-/** Take the choices of the session. @param {import("../engine/messages.js").Events["choices"]} message
+/** Take the choices of the session. @param {Events["choices"]} message
  * @param {Ui} ui @returns {Partial<Ui>} */
 export function choicesUpdate({ version, choices, resources }, ui) {
-  return {
-    choices,
-    choicesVersion: version,
-    resources: { ...ui.resources, ...resources },
-  };
+  return { choices, choicesVersion: version, resources: { ...ui.resources, ...resources } };
 }
 
 /** @param {{ui: Ui, app: App}} props */

@@ -14,8 +14,7 @@ import { exposureOf } from './display_state.js';
 import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 const DELTA_E_TIP = t(
   'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.',
@@ -26,11 +25,7 @@ const MASTER_TIP = t(
 );
 
 /** States of the sentence. */
-const STATES = {
-  live: t('live'),
-  analysing: t('analysing'),
-  hidden: t('answer not shown'),
-};
+const STATES = { live: t('live'), analysing: t('analysing'), hidden: t('answer not shown') };
 
 const STATE_TIPS = {
   live: t('A quick answer while you paint. The exact one follows.'),

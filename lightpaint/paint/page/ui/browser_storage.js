@@ -3,10 +3,8 @@
 import { PREFERENCE_FIELDS, validPreferences } from './preferences.js';
 import { MIN_BRUSH_SIZE, MAX_BRUSH_SIZE, distinctPaints } from './tools.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./tools.js").Paint} Paint */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
+/** @import { RGB, Ui, UiStore } from './ui_state.js' */
+/** @import { Paint } from './tools.js' */
 
 /** Storage key. Values of an older page, or of other code, are validated before use. */
 const [FOLDS_KEY, TOOL_KEY, PREFERENCES_KEY] = [

@@ -2,16 +2,15 @@
 
 import { paneAt } from './pointer_input.js';
 
-/** @typedef {import('./engine_interface.js').Engine} Engine */
-/** @typedef {import('./ui_state.js').Ui} Ui */
-/** @typedef {import('./ui_state.js').UiStore} UiStore */
+/** @import { Engine, Pane, RGB, Ui, UiStore } from './ui_state.js' */
+/** What is under the pointer. place: column and row in the picture, not rounded. light: of the picture there.
+ * paint: what to paint with, as the hand does, to have that light there.
+ * @typedef {NonNullable<ReturnType<Engine["probe"]>> & {place: [number, number], light: RGB, paint: RGB}} Probe */
 
-/**
- * Draw the brush at a place, or at its last one: a ring under the pointer, and a fainter one at the
+/** Draw the brush at a place, or at its last one: a ring under the pointer, and a fainter one at the
  * same place in the other picture.
  * @param {HTMLElement | null} rings @param {Engine} engine @param {Ui} ui
- * @param {number} [x] @param {number} [y]
- */
+ * @param {number} [x] @param {number} [y] */
 export function drawRings(
   rings,
   engine,
@@ -88,8 +87,8 @@ export function refreshProbe(engine, store) {
   if (place) reportProbe(engine, store, place.x, place.y);
 }
 
-/** @param {Engine} engine @param {import('./engine_interface.js').Pane} pane @param {number} x
- * @param {number} y @returns {import('./engine_interface.js').Probe | null} */
+/** @param {Engine} engine @param {Pane} pane @param {number} x
+ * @param {number} y @returns {Probe | null} */
 function probePane(engine, { kind, left, top, scale }, x, y) {
   const [px, py] = [(x - left) / scale, (y - top) / scale];
   const result = engine.probe(px, py);

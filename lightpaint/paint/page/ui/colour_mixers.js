@@ -1,22 +1,78 @@
 /** The controls of one colour: white, HSV with a wheel, RGB and hex. */
 
-import { html, useState } from '../vendor/preact.js';
-import {
-  encode,
-  decode,
-  fromHex,
-  fromHsv,
-  fromKelvin,
-  toHex,
-  toHsv,
-  toKelvin,
-} from './paint_colour.js';
-import { ColourWheel } from './colour_wheel.js';
-import { Slider, TextField } from './controls.js';
-import { KelvinSlider, gradient, clampKelvin } from './kelvin_slider.js';
+import { html, useState, useRef } from '../vendor/preact.js';
+import { decode, encode, fromHex, fromHsv, fromKelvin } from '../../../viewer/drawing/colour.js';
+import { isSameHue, toHex, toHsv, toKelvin } from '../../../viewer/drawing/colour.js';
+import { Choice, Slider, TextField } from './controls.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").RGB} RGB */
+/** @import { RGB } from './ui_state.js' */
+
+/** @typedef {(hue: number, saturation: number, isFinal: boolean) => void} SetHue */
+
+/** Red is at the top, and hues go clockwise.
+ * @param {{hue: number, saturation: number, set: SetHue}} props hue in degrees, saturation 0 to 1;
+ *   isFinal: false while it is dragged */
+function ColourWheel({ hue, saturation, set }) {
+  const pointer = useRef(/** @type {number | null} */ (null));
+  const pick = (/** @type {PointerEvent} */ event, /** @type {boolean} */ isFinal) => {
+    const wheel = /** @type {HTMLElement} */ (event.currentTarget);
+    const { left, top, width, height } = wheel.getBoundingClientRect();
+    const x = (2 * (event.clientX - left)) / width - 1;
+    const y = (2 * (event.clientY - top)) / height - 1;
+    const angle = (Math.atan2(x, -y) * 180) / Math.PI;
+    set((angle + 360) % 360, Math.min(1, Math.hypot(x, y)), isFinal);
+  };
+  const down = (/** @type {PointerEvent} */ event) => {
+    if (event.button !== 0 || pointer.current !== null) return;
+    /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
+    pointer.current = event.pointerId;
+    pick(event, false);
+  };
+  const follow = (/** @type {boolean} */ isFinal) => (/** @type {PointerEvent} */ event) => {
+    if (event.pointerId !== pointer.current) return;
+    if (isFinal) pointer.current = null;
+    pick(event, isFinal);
+  };
+  const angle = (hue * Math.PI) / 180;
+  const place = {
+    left: `${50 * (1 + saturation * Math.sin(angle))}%`,
+    top: `${50 * (1 - saturation * Math.cos(angle))}%`,
+  };
+  return html`<div class="wheel" aria-hidden="true" data-tip=${t('Hue around the wheel, saturation outwards')} onPointerDown=${down}
+    onPointerMove=${follow(false)} onPointerUp=${follow(true)} onPointerCancel=${follow(true)}>
+    <i style=${place}></i></div>`;
+}
+
+/** Ends of the slider. */
+const [MIN_KELVIN, MAX_KELVIN] = [1500, 15000];
+
+const MIRED_CURVE = {
+  toPosition: (/** @type {number} */ k) => 1e6 / k,
+  toValue: (/** @type {number} */ x) => Math.round(1e6 / x / 50) * 50,
+};
+
+/** Return the CSS gradient of the track. @param {RGB[]} colours */
+export const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`;
+
+const TRACK = gradient(
+  Array.from({ length: 12 }, (_, i) => {
+    const [low, high] = [MIRED_CURVE.toPosition(MAX_KELVIN), MIRED_CURVE.toPosition(MIN_KELVIN)];
+    return fromKelvin(MIRED_CURVE.toValue(low + (i / 11) * (high - low)));
+  }),
+);
+
+/** @param {number} kelvin */
+const clampKelvin = (kelvin) => Math.min(MAX_KELVIN, Math.max(MIN_KELVIN, kelvin));
+
+/** @param {{value: number, change: (kelvin: number, isFinal: boolean) => void, label?: string,
+ *   disabled?: boolean}} props */
+function KelvinSlider({ value, change, label = t('CCT'), disabled }) {
+  return html`<${Slider} label=${label} value=${clampKelvin(value)} min=${MIN_KELVIN}
+    max=${MAX_KELVIN} step=${100} unit=${t('K')} curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
+    tip=${t('Correlated colour temperature: warmer to the right')} change=${change} />`;
+}
+
 /** isFinal: false while a slider moves. @typedef {(colour: RGB, isFinal: boolean) => void} SetColour */
 
 /** Choices of these controls. */
@@ -27,7 +83,7 @@ export const MIXERS = [
 ];
 
 /** @param {{colour: RGB, set: SetColour}} props */
-export function Hex({ colour, set }) {
+function Hex({ colour, set }) {
   const take = (/** @type {string} */ text) => {
     const rgb = fromHex(text);
     if (rgb) set(rgb, true);
@@ -37,11 +93,11 @@ export function Hex({ colour, set }) {
 
 /** @param {{colour: RGB, set: SetColour, isPure?: boolean}} props isPure: a new temperature is on
  * Planck's locus, unless the tint was set here */
-export function White({ colour, set, isPure = false }) {
+function White({ colour, set, isPure = false }) {
   // For colours that are not white, and for black, the dials keep the last white.
   const [lastWhite, setLastWhite] = useState({ kelvin: 3200, green: 0 });
   const match = toKelvin(colour);
-  const isLast = isSameHue(fromKelvin(lastWhite.kelvin, lastWhite.green), colour);
+  const isLast = isSameHue(fromKelvin(lastWhite.kelvin, lastWhite.green), colour, 1e-4);
   const white = isLast ? lastWhite : (match ?? lastWhite);
   const isWhite = isLast || match !== null || !Math.max(...colour);
   const level = Math.max(...colour) || 1;
@@ -67,15 +123,9 @@ export function White({ colour, set, isPure = false }) {
         setWhite({ green: value }, isFinal)} /></div>`;
 }
 
-/** Return whether two colours differ at most in brightness. @param {RGB} a @param {RGB} b */
-function isSameHue(a, b) {
-  const [m, n] = [Math.max(...a), Math.max(...b)];
-  return n > 0 && a.every((x, c) => Math.abs(x / m - b[c] / n) < 1e-4);
-}
-
 /** @param {{colour: RGB, set: SetColour, hasValue?: boolean}} props hasValue: whether brightness is
  * part of the colour, as it is of paint */
-export function Hsv({ colour, set, hasValue = true }) {
+function Hsv({ colour, set, hasValue = true }) {
   const current = toHsv(colour);
   const [lastHsv, setLastHsv] = useState(current);
   // Grey has no hue and black no saturation; the sliders keep theirs.
@@ -112,7 +162,7 @@ export function Hsv({ colour, set, hasValue = true }) {
 }
 
 /** @param {{colour: RGB, set: SetColour}} props */
-export function Rgb({ colour, set }) {
+function Rgb({ colour, set }) {
   const replaceChannel = (/** @type {number} */ channel, /** @type {number} */ value) =>
     /** @type {RGB} */ (colour.map((x, c) => (c === channel ? decode(value / 255) : x)));
   return html`${[t('Red'), t('Green'), t('Blue')].map(
@@ -122,4 +172,18 @@ export function Rgb({ colour, set }) {
     change=${(/** @type {number} */ value, /** @type {boolean} */ isFinal) =>
       set(replaceChannel(c, value), isFinal)} />`,
   )}`;
+}
+
+/** A colour as hex, white, HSV or RGB, and the choice among these.
+ * @param {{colour: RGB, set: SetColour, mixer: string, choose: (mixer: any) => void, swatch?: any,
+ *   choices?: {value: string, label: string, tip?: string}[], isLamp?: boolean}} props swatch: before the
+ *   hex field. isLamp: brightness is not part of the colour */
+export function ColourMixer({ colour, set, mixer, choose, swatch, choices = MIXERS, isLamp }) {
+  return html`<div class="colour-row">${swatch}
+      <${Hex} colour=${colour} set=${set} />
+      <${Choice} label=${t('Colour model')} value=${mixer} choices=${choices} change=${choose} />
+    </div>
+    ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure=${isLamp} />`}
+    ${mixer === 'hsv' && html`<${Hsv} colour=${colour} set=${set} hasValue=${!isLamp} />`}
+    ${mixer === 'rgb' && html`<${Rgb} colour=${colour} set=${set} />`}`;
 }

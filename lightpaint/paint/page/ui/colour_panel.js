@@ -1,16 +1,14 @@
 /** The colour of the paint as white, HSV, RGB or hex, its brightness, and swatches. */
 
 import { html } from '../vendor/preact.js';
-import { fromHex, fromKelvin, toHex } from './paint_colour.js';
-import { Hex, Hsv, MIXERS, Rgb, White } from './colour_mixers.js';
-import { Choice, Slider } from './controls.js';
+import { fromHex, fromKelvin, toHex } from '../../../viewer/drawing/colour.js';
+import { ColourMixer } from './colour_mixers.js';
+import { Slider } from './controls.js';
 import { signedText } from './format.js';
 import { paintOf } from './display_state.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").RGB} RGB */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, RGB, Ui } from './ui_state.js' */
 
 /** Warm is right, as on the sliders and in an adjusting drag. */
 const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
@@ -28,16 +26,11 @@ const GELS = [
 export function ColourPanel({ ui, app }) {
   const { store } = app;
   const set = (/** @type {RGB} */ colour) => store.set({ colour });
-  const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
-    <div class="colour-row">
-      <span class="patch" data-tip=${t('Left: the colour. Right: how the display shows it at this brightness.')}
-        style=${{ '--colour': toHex(ui.colour), '--shown': displayColour(ui, app) }}></span>
-      <${Hex} colour=${ui.colour} set=${set} />
-      <${Choice} label=${t('Colour model')} value=${ui.mixer} choices=${MIXERS}
-        change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
-    </div>
-    <${Mixer} colour=${ui.colour} set=${set} />
+    <${ColourMixer} colour=${ui.colour} set=${set} mixer=${ui.mixer}
+      swatch=${html`<span class="patch" data-tip=${t('Left: the colour. Right: how the display shows it at this brightness.')}
+        style=${{ '--colour': toHex(ui.colour), '--shown': displayColour(ui, app) }}></span>`}
+      choose=${(/** @type {any} */ mixer) => store.set({ mixer })} />
     <${Slider} label=${t('Brightness')} value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
       unit=${t('st')} resetValue=${0} tip=${t('Stops above display white. Paint can be brighter than white.')}
       change=${(/** @type {number} */ stops) => store.set({ stops })} />

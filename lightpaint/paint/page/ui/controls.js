@@ -28,11 +28,9 @@ export function useId() {
   return id;
 }
 
-/**
- * A button with an icon, a word, or both. `tip` is its label where it has no word.
+/** A button with an icon, a word, or both. `tip` is its label where it has no word.
  * @param {{icon?: string, label?: string, tip?: string, keys?: string, pressed?: boolean,
- *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props
- */
+ *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props */
 export function Button({ icon, label, tip, keys, pressed, disabled, primary, act, class: name }) {
   const kind = [
     'button',
@@ -51,12 +49,10 @@ export function Button({ icon, label, tip, keys, pressed, disabled, primary, act
   </button>`;
 }
 
-/**
- * A choice of one among a few visible options.
+/** A choice of one among a few visible options.
  * @param {{label: string, value: any, choices: {value: any, label: string, icon?: string,
  *   tip?: string, keys?: string, disabled?: boolean}[], change: (value: any) => void,
- *   icons?: boolean}} props
- */
+ *   icons?: boolean}} props */
 export function Choice({ label, value, choices, change, icons }) {
   return html`<div class="choice" role="group" aria-label=${label}>
     ${choices.map(
@@ -71,11 +67,9 @@ export function Choice({ label, value, choices, change, icons }) {
 /** Characters that fit into a field or a list in any panel. */
 const MAX_VISIBLE_CHARACTERS = 12;
 
-/**
- * A choice of one among many. Its tip repeats text that may not fit.
+/** A choice of one among many. Its tip repeats text that may not fit.
  * @param {{label: string, value: string, choices: {value: string, label: string}[],
- *   change: (value: string) => void, hidden?: boolean, tip?: string}} props
- */
+ *   change: (value: string) => void, hidden?: boolean, tip?: string}} props */
 export function Select({ label, value, choices, change, hidden, tip }) {
   const chosenLabel = choices.find((choice) => choice.value === value)?.label ?? '';
   const fullText =
@@ -102,12 +96,10 @@ export function Checkbox({ label, checked, change, tip, disabled, keys, hidden }
   </label>`;
 }
 
-/**
- * A line of text, taken on Enter or when the field loses focus, cancelled by Escape. `take` gets text
+/** A line of text, taken on Enter or when the field loses focus, cancelled by Escape. `take` gets text
  * that is neither empty nor the old one. tip: of text that may not fit.
  * @param {{label: string, value: string, take: (text: string) => void, class: string, maxLength?: number,
- *   hidden?: boolean, tip?: string}} props
- */
+ *   hidden?: boolean, tip?: string}} props */
 export function TextField({ label, value, take, class: kind, maxLength, hidden, tip }) {
   const [draft, setDraft, draftRef] = useDraft();
   const commit = () => {
@@ -126,15 +118,13 @@ export function TextField({ label, value, take, class: kind, maxLength, hidden, 
       onBlur=${commit} onKeyDown=${press} /></label>`;
 }
 
-/**
- * A typed number: taken on Enter or when the field loses focus, cancelled by Escape, stepped by the
+/** A typed number: taken on Enter or when the field loses focus, cancelled by Escape, stepped by the
  * arrow keys. digits: after the point; figures: significant digits that are shown, instead, while a
  * typed number is taken in full. start: value from which the keys step in an empty field. For text that
  * cannot be taken as it is, the field sends the event `refused`, with a sentence as its detail.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
  *   min?: number, max?: number, step?: number, digits?: number, figures?: number, unit?: string,
- *   start?: number, hidden?: boolean, placeholder?: string, disabled?: boolean, tip?: string}} props
- */
+ *   start?: number, hidden?: boolean, placeholder?: string, disabled?: boolean, tip?: string}} props */
 export function NumberField(props) {
   const { label, value, change, step = 1, digits = 2, unit, hidden, placeholder, disabled } = props;
   const { min = -Infinity, max = Infinity, figures, start = 0, tip } = props;
@@ -182,14 +172,12 @@ export function NumberField(props) {
   </label>`;
 }
 
-/**
- * A slider with its number beside it. `change(value, done)`: done is false while it moves. `curve`
+/** A slider with its number beside it. `change(value, done)`: done is false while it moves. `curve`
  * maps a value to a place and back; if it decreases, the greatest value is left.
  * @param {{label: string, value: number, min: number, max: number, step?: number, unit?: string,
  *   digits?: number, change: (value: number, isFinal: boolean) => void, track?: string, resetValue?: number,
  *   curve?: {toPosition: (x: number) => number, toValue: (t: number) => number}, text?: string, plain?: boolean,
- *   disabled?: boolean, keys?: string, tip?: string}} props
- */
+ *   disabled?: boolean, keys?: string, tip?: string}} props */
 export function Slider(props) {
   const { label, value, min, max, step = 1, unit, digits = 0, change, track, resetValue } = props;
   const { curve, text, plain, disabled, keys, tip } = props;
@@ -235,11 +223,9 @@ export function Slider(props) {
   </div>`;
 }
 
-/**
- * Text that may be truncated: if it is longer than a number of characters, its tip has all of it,
+/** Text that may be truncated: if it is longer than a number of characters, its tip has all of it,
  * also for the keyboard.
- * @param {{text: string, maxLength: number, class?: string, tag?: string}} props
- */
+ * @param {{text: string, maxLength: number, class?: string, tag?: string}} props */
 export function TruncatedText({ text, maxLength, class: name, tag: Tag = 'span' }) {
   const isLong = text.length > maxLength;
   return html`<${Tag} class=${name} data-tip=${isLong ? text : undefined}
@@ -266,8 +252,7 @@ export function Fold({ title, name, open, toggle, children, extra, class: classe
   </section>`;
 }
 
-/**
- * Scroll a part of the painter into view once it exists, and optionally focus it.
+/** Scroll a part of the painter into view once it exists, and optionally focus it.
  * @param {HTMLElement} element whatever in the same painter @param {string} name @param {boolean} [isFocused]
  */
 export function reveal(element, name, isFocused = false) {
@@ -282,11 +267,9 @@ export function reveal(element, name, isFocused = false) {
 /** Height in pixels below which the visible part of a painter is too low for a dialog. */
 const MIN_DIALOG_HEIGHT = 300;
 
-/**
- * Place a dialog over the visible part of the painter. The centre of the frame may be far away: VS
+/** Place a dialog over the visible part of the painter. The centre of the frame may be far away: VS
  * Code shows all outputs of a notebook in one frame, as high as all of them together.
- * @param {HTMLElement} element
- */
+ * @param {HTMLElement} element */
 function placeOver(element) {
   const root = /** @type {HTMLElement} */ (element.closest('.lightpaint'));
   const box = root.getBoundingClientRect();
@@ -300,10 +283,8 @@ function placeOver(element) {
   }
 }
 
-/**
- * A dialog over the painter that keeps the focus until it is closed; Escape closes it.
- * @param {{title: string, close: () => void, children?: any, class?: string}} props
- */
+/** A dialog over the painter that keeps the focus until it is closed; Escape closes it.
+ * @param {{title: string, close: () => void, children?: any, class?: string}} props */
 export function Dialog({ title, close, children, class: name }) {
   const ref = useRef(/** @type {HTMLDialogElement | null} */ (null));
   const id = useId();
@@ -330,4 +311,14 @@ export function Dialog({ title, close, children, class: name }) {
     </div>
     <div class="dialog-body">${children}</div>
   </dialog>`;
+}
+
+/** @param {{progress: {done: number, total: number, unit?: string}, label: string}} props */
+export function ProgressBar({ progress, label }) {
+  const { done, total } = progress;
+  const isKnown = total > 0;
+  return html`<span class=${`bar ${isKnown ? '' : 'is-endless'}`} role="progressbar"
+    aria-label=${label} aria-valuemin="0" aria-valuemax=${isKnown ? total : undefined}
+    aria-valuenow=${isKnown ? done : undefined}>
+    <i style=${{ '--share': String(isKnown ? Math.min(1, done / total) : 1) }}></i></span>`;
 }

@@ -1,20 +1,17 @@
 /** Dialogs over the painter: keyboard shortcuts and export. */
 
-import { html, useState } from '../vendor/preact.js';
-import { ProgressBar } from './progress_bar.js';
-import { Button, Checkbox, Dialog } from './controls.js';
-import { ExportKind } from './exports/export_kind.js';
-import { ExportName, suggestedName } from './exports/export_name.js';
+import { html, useState, useEffect } from '../vendor/preact.js';
+import { Button, Checkbox, Dialog, ProgressBar } from './controls.js';
+import { ExportName, suggestedName, ExportKind } from './exports/export_fields.js';
 import { FinalRenderDialog } from './exports/final_render.js';
-import { percentText, progressText, relativePath } from './format.js';
+import { percentText, progressText, relativePath, durationText } from './format.js';
 import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
-import { MoveDialog } from './searches/move_dialog.js';
 import { ShortcutsDialog } from './shortcuts_dialog.js';
+import { toggled } from './ui_store.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 /** @param {{ui: Ui, app: App}} props */
 export function Dialogs({ ui, app }) {
@@ -32,21 +29,13 @@ export function Dialogs({ ui, app }) {
 /** @type {{key: import("../engine/messages.js").Export["outputs"][number], label: string,
  *   description: string}[]} */
 const EXPORTS = [
-  {
-    key: 'target',
-    label: t('Painting'),
-    description: t('painting.exr, for lightpaint solve'),
-  },
+  { key: 'target', label: t('Painting'), description: t('painting.exr, for lightpaint solve') },
   {
     key: 'layers',
     label: t('Layers'),
     description: t('layers.exr and layers.ora, for Krita and others'),
   },
-  {
-    key: 'picture',
-    label: t('Picture'),
-    description: t('answer.png: the answer as a picture'),
-  },
+  { key: 'picture', label: t('Picture'), description: t('answer.png: the answer as a picture') },
   {
     key: 'lighting',
     label: t('Lighting'),
@@ -84,9 +73,8 @@ function ExportDialog({ ui, app, close }) {
     <${ExportName} name=${name} change=${setName} />
     ${available.map(
       ({ key, label, description }) => html`<div class="export-row" key=${key}>
-      <${Checkbox} label=${label} checked=${outputs.includes(key)} change=${(
-        /** @type {boolean} */ on,
-      ) => setOutputs(on ? [...outputs, key] : outputs.filter((output) => output !== key))} />
+      <${Checkbox} label=${label} checked=${outputs.includes(key)} 
+        change=${() => setOutputs(toggled(outputs, key))} />
       <span class="faint">${description}</span></div>`,
     )}
     ${
@@ -146,4 +134,43 @@ function CopyButton({ text, app, label, tip }) {
   };
   return html`<${Button} label=${label && (isCopied ? t('Copied') : label)} tip=${isCopied && tip ? t('Copied') : tip}
     icon=${isCopied ? 'check' : 'copy'} act=${copy} />`;
+}
+
+/** @typedef {import("../engine/messages.js").Events["place_estimate"]} Estimate */
+
+/** @param {{app: App, close: () => void}} props */
+function MoveDialog({ app, close }) {
+  const { session } = app;
+  const [estimate, setEstimate] = useState(/** @type {Estimate | null} */ (null));
+  useEffect(() => {
+    let isClosed = false;
+    void session.send('estimate_place').then((reply) => {
+      if (isClosed) return;
+      if (reply?.kind === 'place_estimate') setEstimate(/** @type {any} */ (reply));
+      else close(); // a toast says why
+    });
+    return () => {
+      isClosed = true;
+    };
+  }, []);
+  const begin = () => {
+    close();
+    void session.placeLights();
+  };
+  return html`<${Dialog} title=${t('Let lights move')} close=${close} class="move">
+    <p role="status">${estimate ? estimate.text : t('Estimating the time …')}</p>
+    ${estimate && html`<p><strong>${timeText(estimate)}</strong></p>`}
+    <p class="faint">${t('You can go on looking and painting meanwhile, and stop at any time: with the best so far, or with every light where it is.')}</p>
+    <div class="row"><${Button} label=${t('Cancel')} act=${close} />
+      <${Button} icon="search" label=${t('Begin')} primary disabled=${!estimate} act=${begin} /></div>
+  </${Dialog}>`;
+}
+
+/** @param {Estimate} estimate */
+function timeText({ seconds, is_measured: isMeasured }) {
+  const [low, high] = seconds.map(durationText);
+  const time = low === high ? low : t('{low} to {high}', { low, high });
+  return isMeasured
+    ? t('About {time}, as an earlier search here.', { time })
+    : t('About {time}.', { time });
 }

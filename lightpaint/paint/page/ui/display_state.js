@@ -1,12 +1,9 @@
 /** What the pictures show: the chosen display with temporary changes, and the light of the paint. */
 
 import { comparedDisplay } from './look_comparison.js';
-import { withOriginal } from './original_scene.js';
+import { withOriginal } from './held_pictures.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./engine_interface.js").DrawnDisplay} DrawnDisplay */
-/** @typedef {import("./ui_state.js").Light} Light */
-/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @import { DrawnDisplay, Light, RGB, Ui } from './ui_state.js' */
 
 /** Return what is drawn: the chosen display with temporary changes.
  * @param {Ui} ui @returns {DrawnDisplay} */

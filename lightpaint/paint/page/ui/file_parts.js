@@ -2,7 +2,7 @@
 
 import { t } from '../language/language.js';
 
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App } from './ui_state.js' */
 
 /** Bytes of a row of a part, and rows of a part. */
 const [ROW_BYTES, PART_ROWS] = [2 ** 16, 16];

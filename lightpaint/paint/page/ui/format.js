@@ -1,6 +1,6 @@
 /** Numbers as text: a true minus sign, few digits, units behind. */
 
-import { luminance, toKelvin } from './paint_colour.js';
+import { luminance, toKelvin } from '../../../viewer/drawing/colour.js';
 import { plural, t } from '../language/language.js';
 
 const MINUS = '\u2212';
@@ -117,6 +117,9 @@ export function shortenName(name, maxLength) {
 /** @param {number} count of lights @returns {string} */
 export const lightCountText = (count) =>
   plural(count, { one: '{count} light', other: '{count} lights' });
+
+/** @param {string} text */
+export const capitalized = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Return the name of a file without its folder. @param {string} file @param {string} folder */
 export function relativePath(file, folder) {

@@ -2,14 +2,14 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Checkbox } from './controls.js';
-import { clockText, dateText } from './format.js';
-import { SearchRow } from './searches/search_row.js';
+import { capitalized, clockText, dateText, durationText } from './format.js';
 import { Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
+import { Icon } from './icons.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("../engine/messages.js").StepInfo} Step */
+/** @import { App, Ui } from './ui_state.js' */
+/** @import { SearchInfo as Search, StepInfo as Step } from '../engine/messages.js' */
+
 /** @typedef {import("../engine/messages.js").Events["steps"]} StepList */
 
 /** Steps listed at first, and added each time that more are requested. */
@@ -20,9 +20,6 @@ const MIN_FILTERED_COUNT = 12;
 
 /** The state before all steps. @type {Step} */
 const BEGINNING = { id: 0, label: t('Beginning'), stamp: null, is_milestone: true };
-
-/** @param {string} label */
-const capitalized = (label) => label.charAt(0).toUpperCase() + label.slice(1);
 
 /** Request the list, and again whenever the history has changed.
  * @param {Ui} ui @param {App} app @param {number} count @returns {StepList | null} */
@@ -120,4 +117,20 @@ function StepRow({ step, ui, app, isUndone, isCurrent }) {
     ${isUndone && html`<span class="only-read">${t(', undone')}</span>`}
     <span class="faint">${stamp === null ? '' : clockText(stamp)}</span>
   </button></li>`;
+}
+
+/** @param {{search: Search}} props */
+function SearchRow({ search }) {
+  const [isOpen, setOpen] = useState(false);
+  const { title, text, tried, stamp, seconds } = search;
+  return html`<li class="search-note"><button type="button" aria-expanded=${String(isOpen)}
+      onClick=${() => setOpen(!isOpen)}><${Icon} name="search" />
+      <span class="step-label"><strong>${capitalized(title)}</strong><span>${text}</span></span>
+      <span class="faint">${clockText(stamp)}</span></button>
+    ${
+      isOpen &&
+      html`<div class="search-tried"><p>${t('Took {time}. Tried:', { time: durationText(seconds) })}</p>
+      ${tried.map((sentence) => html`<p key=${sentence}>${sentence}</p>`)}</div>`
+    }
+  </li>`;
 }

@@ -4,9 +4,7 @@ import { html, useRef } from '../vendor/preact.js';
 import { updateDisplay } from './tools.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Display} Display */
-/** @typedef {import("./engine_interface.js").Pane} Pane */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @import { Display, Pane, UiStore } from './ui_state.js' */
 
 /** Pixels after which a press is a drag. */
 const THRESHOLD = 6;

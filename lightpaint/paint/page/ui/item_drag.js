@@ -3,14 +3,12 @@
 /** Pixels after which a press is a drag. */
 const THRESHOLD = 6;
 
-/**
- * Follow a press on an item of a list. `move` is called while it is dragged, `drop` at its end unless it
+/** Follow a press on an item of a list. `move` is called while it is dragged, `drop` at its end unless it
  * is cancelled, by Escape too. The item has the class `is-dragged` meanwhile, and `data-drop` marks
  * of the list are removed afterwards.
  * @param {PointerEvent} event the press, on the list
  * @param {HTMLElement} item
- * @param {{move: (event: PointerEvent) => void, drop: (event: PointerEvent) => void}} handlers
- */
+ * @param {{move: (event: PointerEvent) => void, drop: (event: PointerEvent) => void}} handlers */
 export function dragItem(event, item, { move, drop }) {
   const list = /** @type {HTMLElement} */ (event.currentTarget);
   const ends = new AbortController();

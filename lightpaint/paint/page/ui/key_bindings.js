@@ -1,6 +1,34 @@
 /** Keys of the commands: those that the painter comes with, or others that a person has set. */
 
-import { keyName } from './key_names.js';
+import { t } from '../language/language.js';
+
+/** Name of the Ctrl key on this system. */
+const MOD = /mac/i.test(navigator.platform) ? '⌘' : t('Ctrl');
+
+/** @type {Record<string, string>} */
+const NAMES = {
+  Ctrl: MOD,
+  Control: MOD,
+  Shift: t('Shift'),
+  Alt: t('Alt'),
+  Esc: t('Esc'),
+  Escape: t('Esc'),
+  Enter: t('Enter'),
+  Space: t('Space'),
+  Tab: t('Tab'),
+  Delete: t('Delete', { context: 'key' }),
+};
+
+/** Return the name of a key. @param {string} key */
+export const keyName = (key) => NAMES[key] ?? key;
+
+/** Return keys that are pressed together, or one after another, as a tip shows them.
+ * @param {string} keys as `aria-keyshortcuts` has them */
+export const keysText = (keys) =>
+  keys
+    .split(/[+ ](?=.)/)
+    .map(keyName)
+    .join(' ');
 
 /** The browser's name of each key, after mod (Ctrl or ⌘) and shift. */
 export const DEFAULT_KEYS = {

@@ -4,8 +4,8 @@ import { commandOf, hasModifier, pressedKeys } from './key_bindings.js';
 import { SHORTCUTS, escape } from './shortcuts.js';
 import { setFlow } from './tools.js';
 
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("./shortcuts.js").CommandKey} CommandKey */
+/** @import { App } from './ui_state.js' */
+/** @import { CommandKey } from './shortcuts.js' */
 
 const COMMAND_KEYS = new Map(
   SHORTCUTS.flatMap(({ keys }) => keys).flatMap((key) =>
@@ -54,10 +54,8 @@ function commit(event) {
   field.focus({ preventScroll: true });
 }
 
-/**
- * Return the shortcut of a key, if there is one here.
- * @param {KeyboardEvent} event @param {App} app
- */
+/** Return the shortcut of a key, if there is one here.
+ * @param {KeyboardEvent} event @param {App} app */
 export function handleKey(event, app) {
   const isAlt = event.altKey && !event.getModifierState('AltGraph');
   if (event.defaultPrevented || isAlt) return;
@@ -91,21 +89,17 @@ function worksInField(event, shortcut) {
 /** Keys that change a notebook's cells with Ctrl or ⌘: cut, paste, redo, run. */
 const CELL_KEYS = ['x', 'v', 'y', 'enter'];
 
-/**
- * Return whether to keep a key from the notebook. Letters and Delete would create and delete cells.
+/** Return whether to keep a key from the notebook. Letters and Delete would create and delete cells.
  * Function keys and most keys with Ctrl or ⌘ pass through.
- * @param {KeyboardEvent} event that `press` has seen
- */
+ * @param {KeyboardEvent} event that `press` has seen */
 function belongsToPainter(event) {
   if (event.defaultPrevented) return true;
   if (hasModifier(event)) return !isTyping(event) && CELL_KEYS.includes(event.key.toLowerCase());
   return !/^F\d+$/.test(event.key);
 }
 
-/**
- * Handle the keys of a painter in a notebook, and keep them from the notebook.
- * @param {HTMLElement} root @param {App} app @param {AbortSignal} signal ends it
- */
+/** Handle the keys of a painter in a notebook, and keep them from the notebook.
+ * @param {HTMLElement} root @param {App} app @param {AbortSignal} signal ends it */
 export function listenWithin(root, app, signal) {
   const handle = (/** @type {KeyboardEvent} */ event) => {
     handleKey(event, app);

@@ -4,12 +4,11 @@ import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
 import { directionFrom, onRailAt, skyAngles } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
-import { luminance } from './paint_colour.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
 import { t } from '../language/language.js';
 import { completePair } from './references/reference_picture.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, ClickAction, Ui } from './ui_state.js' */
 
 /** Labels of what the next click does to a light. */
 const CLICK_MODES = /** @type {const} */ ({
@@ -24,7 +23,7 @@ const CLICK_MODES = /** @type {const} */ ({
   },
 });
 
-/** Hint on what to click next. @param {import("./ui_state.js").ClickAction} action
+/** Hint on what to click next. @param {ClickAction} action
  * @param {Ui["lights"]} lights */
 export function pointingHint(action, lights) {
   if (action.mode === 'hang')

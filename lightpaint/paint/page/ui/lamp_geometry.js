@@ -1,6 +1,6 @@
 /** Projection of scene points to the picture, and from a pointer back to the scene. */
 
-/** @typedef {import("../engine/messages.js").Camera} Camera */
+/** @import { Camera } from '../engine/messages.js' */
 /** @typedef {[number, number, number]} Vector */
 
 /** Sine of the angle between ray and plane below which their intersection is too uncertain. */
@@ -16,7 +16,7 @@ export const add = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t 
 export const subtract = (a, b) => add(a, b, -1);
 
 /** @param {number[]} a @param {number[]} b @returns {Vector} */
-const cross = (a, b) => [
+export const cross = (a, b) => [
   a[1] * b[2] - a[2] * b[1],
   a[2] * b[0] - a[0] * b[2],
   a[0] * b[1] - a[1] * b[0],
@@ -40,11 +40,9 @@ function coefficients(a, b, c, v) {
   ];
 }
 
-/**
- * Return a point's place in pixels of the picture, and whether it is in front of the camera. For a
+/** Return a point's place in pixels of the picture, and whether it is in front of the camera. For a
  * point behind it, the place belongs to the opposite direction.
- * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}}
- */
+ * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}} */
 export function project(camera, point) {
   const [x, y, s] = coefficients(
     camera.x_axis,
@@ -59,11 +57,9 @@ export function project(camera, point) {
 /** Depth of the plane before the camera at which polygons are cut, relative to their deepest corner. */
 const NEAR_SHARE = 1e-3;
 
-/**
- * Return the corners of a polygon in pixels of the picture, without the part behind the camera.
+/** Return the corners of a polygon in pixels of the picture, without the part behind the camera.
  * @param {Camera} camera @param {number[][]} corners in the scene @returns {[number, number][]} fewer
- *   or more than there were; none if all of it lies behind the camera
- */
+ *   or more than there were; none if all of it lies behind the camera */
 export function projectPolygon(camera, corners) {
   const { origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel } = camera;
   const seen = corners.map((point) =>
@@ -98,12 +94,10 @@ function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isP
     : { origin: add(origin, [0, 0, 0]), direction: normalize(add(offset, forward)) };
 }
 
-/**
- * Return the place to which a pointer drags a light in its horizontal plane. If the plane is seen
+/** Return the place to which a pointer drags a light in its horizontal plane. If the plane is seen
  * edge-on, the light moves parallel to the picture instead, at its distance.
  * @param {Camera} camera @param {number[]} place of the light @param {number} up axis
- * @param {number} x @param {number} y in pixels of the picture @returns {Vector}
- */
+ * @param {number} x @param {number} y in pixels of the picture @returns {Vector} */
 export function dragInPlane(camera, place, up, x, y) {
   const { origin, direction } = rayAt(camera, x, y);
   const depth = dot(subtract(place, origin), direction);
@@ -193,12 +187,10 @@ export function nudged(camera, place, up, [right, away, upwards]) {
   return add(add(add(place, rightAxis, right), across, sign * away), vertical, upwards);
 }
 
-/**
- * Return a place clamped to a rectangle, along the line to its centre.
+/** Return a place clamped to a rectangle, along the line to its centre.
  * @param {{x: number, y: number, isAhead: boolean}} seen
  * @param {{left: number, top: number, right: number, bottom: number}} box
- * @returns {{x: number, y: number, isInside: boolean, angle: number}} angle: in radians, outwards
- */
+ * @returns {{x: number, y: number, isInside: boolean, angle: number}} angle: in radians, outwards */
 export function clampToBox({ x, y, isAhead }, { left, top, right, bottom }) {
   const [cx, cy] = [(left + right) / 2, (top + bottom) / 2];
   const isInside = isAhead && x >= left && x <= right && y >= top && y <= bottom;
@@ -211,4 +203,15 @@ export function clampToBox({ x, y, isAhead }, { left, top, right, bottom }) {
     (bottom - top) / 2 / Math.max(Math.abs(dy), 1e-9),
   );
   return { x: cx + t * dx, y: cy + t * dy, isInside, angle };
+}
+
+/** Return whether a polygon has a point, by the sides that a ray to the right crosses.
+ * @param {[number, number][]} corners @param {number} x @param {number} y */
+export function isInside(corners, x, y) {
+  let isIn = false;
+  corners.forEach(([ax, ay], k) => {
+    const [bx, by] = corners[(k + 1) % corners.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) isIn = !isIn;
+  });
+  return isIn;
 }

@@ -16,15 +16,13 @@ import {
 import { pressLight } from './lamps/light_selection.js';
 import { useMarkDrag } from './lamps/mark_drag.js';
 import { showsElsewhere } from './look_comparison.js';
-import { toHex } from './paint_colour.js';
-import { atFullBrightness, luminance } from './paint_colour.js';
+import { atFullBrightness, luminance, toHex } from '../../../viewer/drawing/colour.js';
+import { distinctPanes } from './pane_canvas.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Pane} Pane */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
-/** @typedef {import("../engine/messages.js").Camera} Camera */
+/** @import { App, Pane, Ui } from './ui_state.js' */
+/** @import { Camera, LightPlace } from '../engine/messages.js' */
+
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 /** @typedef {{x: number, y: number}} Point */
 
@@ -55,13 +53,6 @@ export function LampMarks({ ui, app, panes }) {
       (pane, k) => html`<${PaneMarks} key=${k} ui=${ui} app=${app} pane=${pane} camera=${camera}
       isTwin=${k > 0} />`,
     )}</div>`;
-}
-
-/** Return the panes side by side; of overlapping ones the first. @param {Pane[]} panes */
-function distinctPanes(panes) {
-  return panes.filter(
-    (pane, k) => panes.findIndex((x) => x.left === pane.left && x.top === pane.top) === k,
-  );
 }
 
 /** Return the visible part of a pane's picture. @param {Pane} pane @param {[number, number]} size
@@ -140,11 +131,9 @@ function markAt(camera, { position, direction }) {
   );
 }
 
-/**
- * @param {{ui: Ui, app: App, light: number, place: LightPlace, pane: Pane, camera: Camera,
+/** @param {{ui: Ui, app: App, light: number, place: LightPlace, pane: Pane, camera: Camera,
  *   positionOf: (place: LightPlace) => {x: number, y: number, isInside: boolean, angle: number},
- *   isTwin: boolean}} props
- */
+ *   isTwin: boolean}} props */
 function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
   const position = positionOf(place);
   const { label } = ui.lights[light];
@@ -227,10 +216,8 @@ function showLight({ store }, light, { currentTarget }) {
  * @param {MouseEvent} event */
 const hasControl = ({ ctrlKey, metaKey }) => ctrlKey || metaKey;
 
-/**
- * @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, innerBox: Box,
- *   toPage: (projection: any) => any, isTwin: boolean}} props
- */
+/** @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, innerBox: Box,
+ *   toPage: (projection: any) => any, isTwin: boolean}} props */
 function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const place = placeOf(ui, light);
   const positionOf = (/** @type {{x: number, y: number, isAhead: boolean}} */ projection) =>

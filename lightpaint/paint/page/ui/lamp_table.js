@@ -3,12 +3,11 @@
 import { html } from '../vendor/preact.js';
 import { signedText, whiteText } from './format.js';
 import { meanOf, wholeLight } from './images/light_images.js';
-import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
+import { atFullBrightness, luminance, toHex, toKelvin } from '../../../viewer/drawing/colour.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
+/** @import { Look, RGB, Ui } from './ui_state.js' */
+
 /** @typedef {{name: string, label: string, emissions: (RGB | null)[], difference: number, text: string}} Row
  *   emissions: in both looks; null where a look has no such lamp */
 
@@ -66,17 +65,11 @@ export function rowsOf({ lights, images }, first, second) {
 export function differenceOf([first, second]) {
   if (!first && !second) return { difference: 0, text: '' };
   if (!first || !second)
-    return {
-      difference: Infinity,
-      text: first ? t('is not there') : t('is new'),
-    };
+    return { difference: Infinity, text: first ? t('is not there') : t('is new') };
   const [before, after] = [luminance(first), luminance(second)];
   if (!(before > 0) && !(after > 0)) return { difference: 0, text: '' };
   if (!(before > 0) || !(after > 0))
-    return {
-      difference: Number.MAX_VALUE,
-      text: after > 0 ? t('on') : t('off'),
-    };
+    return { difference: Number.MAX_VALUE, text: after > 0 ? t('on') : t('off') };
   const stops = Math.log2(after / before);
   const parts =
     Math.abs(stops) < MIN_STOPS ? [] : [t('{signed} st', { signed: signedText(stops) })];

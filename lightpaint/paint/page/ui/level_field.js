@@ -1,13 +1,12 @@
 /** A text field for the level of a light, relative to the scene: in stops or percent. */
 
 import { html } from '../vendor/preact.js';
-import { luminance } from './paint_colour.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
 import { useDraft } from './controls.js';
 import { cleanNumberText, stopsText } from './format.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Light} Light */
+/** @import { Light, RGB } from './ui_state.js' */
 
 /** Ends of the dimmer, in stops from now; the left one is off. */
 export const DIMMER_MIN_STOPS = -8;
@@ -77,11 +76,9 @@ function refusalText(text, light) {
   });
 }
 
-/**
- * The level beside a dimmer: typed in stops or percent, stepped by the arrow keys.
+/** The level beside a dimmer: typed in stops or percent, stepped by the arrow keys.
  * @param {{light: Light, rgb: RGB, disabled: boolean, change: (rgb: RGB) => void,
- *   say: (text: string) => void}} props
- */
+ *   say: (text: string) => void}} props */
 export function LevelField({ light, rgb, disabled, change, say }) {
   const [draft, setDraft, draftRef] = useDraft();
   const stops = stopsOf(rgb, light);

@@ -1,9 +1,8 @@
 /** Controls for the constraints on one light. */
 
 import { html, useState } from '../vendor/preact.js';
-import { luminance } from './paint_colour.js';
-import { ColourConstraint, colourKind } from './colour_constraint.js';
-import { Button, Choice, NumberField, Select } from './controls.js';
+import { luminance, atFullBrightness, toHex, toKelvin } from '../../../viewer/drawing/colour.js';
+import { Button, Choice, NumberField, Select, TextField } from './controls.js';
 import { numberText } from './format.js';
 import { LampColour } from './lamps/lamp_colour.js';
 import {
@@ -15,29 +14,17 @@ import {
 } from './level_field.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Constraints} Constraints */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
+/** @import { App, Constraints, Light, RGB } from './ui_state.js' */
+/** @import { Props } from './light_row.js' */
 
 const LEVEL_MODES = [
   { value: 'free', label: t('Free'), tip: t('The solve sets it') },
-  {
-    value: 'held',
-    label: t('Locked'),
-    tip: t('Locked at a level that you set'),
-  },
-  {
-    value: 'present',
-    label: t('As now'),
-    tip: t('It stays as it is in the scene'),
-  },
-  {
-    value: 'off',
-    label: t('Off'),
-    tip: t('Switched off in every answer'),
-  },
+  { value: 'held', label: t('Locked'), tip: t('Locked at a level that you set') },
+  { value: 'present', label: t('As now'), tip: t('It stays as it is in the scene') },
+  { value: 'off', label: t('Off'), tip: t('Switched off in every answer') },
 ];
 
-/** @param {import("./light_row.js").Props} props */
+/** @param {Props} props */
 export function LightConstraints(props) {
   const { k, light, app, constraints = {}, rgb, tie, ui } = props;
   const { session } = app;
@@ -78,7 +65,7 @@ export function LightConstraints(props) {
   </div>`;
 }
 
-/** @param {import("./light_row.js").Props} props */
+/** @param {Props} props */
 function LockedLevel({ k, light, app, rgb }) {
   const [unit, setUnit] = useState(isOnAtPresent(light) ? 'stops' : 'value');
   const level = luminance(rgb);
@@ -117,15 +104,15 @@ function LockedLevel({ k, light, app, rgb }) {
 const SIGNIFICANT_DIGITS = 6;
 
 /** Return the units that a light's level can be given in.
- * @param {import("./ui_state.js").Light} light */
+ * @param {Light} light */
 const unitsOf = (light) => [
   { value: 'share', label: t('% of now') },
   { value: 'value', label: light.unit || 'value' },
 ];
 
 /** Limits of a level and of a colour: of a light, or of all texels of an image.
- * @typedef {{light: import("./ui_state.js").Light, rgb: RGB, constraints: Constraints, isTied: boolean,
- *   isImage?: boolean, app: import("./shortcuts.js").App, set: (constraints: Constraints) => void}} LimitProps
+ * @typedef {{light: Light, rgb: RGB, constraints: Constraints, isTied: boolean,
+ *   isImage?: boolean, app: App, set: (constraints: Constraints) => void}} LimitProps
  * @param {LimitProps} props */
 export function LevelAndColour(props) {
   const { light, constraints, isTied } = props;
@@ -198,7 +185,7 @@ function LevelLimits({ light, app, constraints, isImage = false, set: constrain 
 }
 
 /** A limit as in a lights file: a luminance, a share of the current one like '40%', or a colour.
- * @param {any} level @param {import("./ui_state.js").Light} light @param {string} unit
+ * @param {any} level @param {Light} light @param {string} unit
  * @returns {any} a number, in percent where `unit` is 'share'; null for none */
 function limitAmount(level, light, unit) {
   if (level === undefined || level === null) return null;
@@ -209,7 +196,7 @@ function limitAmount(level, light, unit) {
   return unit === 'share' ? (100 * value) / presentLevel(light) : value;
 }
 
-/** @param {import("./light_row.js").Props} props */
+/** @param {Props} props */
 function TieFields({ light, app, tie, allLights = [] }) {
   const candidates = allLights.filter(
     (other) => !other.is_fixed && other.name !== light.name && !tie?.includes(other.name),
@@ -228,9 +215,96 @@ function TieFields({ light, app, tie, allLights = [] }) {
           .filter((name) => name !== light.name)
           .map(label)
           .join(', '),
-      })}</span><${Button} label=${t('Untie')} act=${() => app.session.untie(light.name)} />`
+      })}</span><${Button} label=${t('Untie')} act=${() => app.session.untie([light.name])} />`
     }
     <${Select} label=${tie ? t('Also tie to') : t('Tie to')} value="" choices=${choices}
-      change=${(/** @type {string} */ name) => name && app.session.tie(light.name, name)} />
+      change=${(/** @type {string} */ name) => name && app.session.tie([light.name, name])} />
   </div>`;
 }
+
+const COLOURS = [
+  { value: 'any', label: t('Any colour') },
+  { value: 'color', label: t('One colour') },
+  { value: 'kelvin', label: t('White range') },
+  { value: 'primaries', label: t('LED mix') },
+];
+
+/** Return the kind of colour constraint of a light. @param {Constraints} constraints */
+const colourKind = (constraints) =>
+  ['color', 'kelvin', 'primaries'].find((key) => constraints[key] !== undefined) ?? 'any';
+
+/** @param {LimitProps} props */
+function ColourConstraint(props) {
+  const { constraints, rgb, set } = props;
+  const kind = colourKind(constraints);
+  const { color, kelvin, duv, primaries, ...otherConstraints } = constraints;
+  const change = (/** @type {string} */ newKind) => {
+    const constraint = {
+      any: {},
+      color: { color: hexOf(rgb) },
+      kelvin: { kelvin: [2700, 6500] },
+      primaries: { primaries: ['#ff0000', '#00ff00', '#0000ff'] },
+    }[newKind];
+    set({ ...otherConstraints, ...constraint });
+  };
+  return html`<div class="ask-row">
+      <${Select} label=${t('Colour')} value=${kind} choices=${COLOURS} change=${change} /></div>
+    ${kind === 'color' && html`<${SingleColour} ...${props} otherConstraints=${otherConstraints} />`}
+    ${kind === 'kelvin' && html`<${WhiteRange} ...${props} otherConstraints=${otherConstraints} />`}
+    ${
+      kind === 'primaries' &&
+      html`<${Words} label=${t('LEDs')} value=${[...primaries].join(', ')}
+      take=${(/** @type {string} */ text) =>
+        set({ ...otherConstraints, primaries: text.split(/[\s,]+/).filter(Boolean) })} />`
+    }`;
+}
+
+/** @param {any} props */
+function SingleColour({ constraints, otherConstraints, rgb, set }) {
+  const text = Array.isArray(constraints.color)
+    ? hexOf(constraints.color)
+    : String(constraints.color);
+  const white = toKelvin(rgb);
+  return html`<div class="ask-row">
+    <${Words} label=${t('Hex or kelvin')} value=${text}
+      take=${(/** @type {string} */ color) => set({ ...otherConstraints, color })} />
+    ${
+      white &&
+      html`<${Button} label=${`${Math.round(white.kelvin / 50) * 50}K`}
+      tip=${t('The white nearest to its colour in the answer')} act=${() =>
+        set({
+          ...otherConstraints,
+          color: `${Math.round(white.kelvin / 50) * 50}K`,
+        })} />`
+    }
+  </div>`;
+}
+
+/** @param {any} props */
+function WhiteRange({ constraints, otherConstraints, set }) {
+  const range = [constraints.kelvin].flat();
+  const [low, high] = [range[0], range.at(-1)];
+  const setRange = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
+    set({
+      ...otherConstraints,
+      kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
+      ...(duv ? { duv } : {}),
+    });
+  const duv = constraints.duv ?? 0;
+  return html`<div class="ask-fields">
+    <${NumberField} label=${t('From')} value=${low} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${t('K')} change=${(/** @type {number} */ kelvin) => setRange(kelvin, high, duv)} />
+    <${NumberField} label=${t('To')} value=${high} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${t('K')} change=${(/** @type {number} */ kelvin) => setRange(low, kelvin, duv)} />
+    <${NumberField} label=${t('Tint')} value=${1000 * duv} min=${-20} max=${20} digits=${1}
+      tip=${t('Duv × 1000: above 0 green, below 0 magenta')}
+      change=${(/** @type {number} */ tint) => setRange(low, high, tint / 1000)} />
+  </div>`;
+}
+
+/** @param {{label: string, value: string, take: (text: string) => void}} props */
+const Words = (props) =>
+  html`<${TextField} class="words" tip=${props.value.length > 16 ? props.value : undefined} ...${props} />`;
+
+/** @param {RGB} rgb */
+const hexOf = (rgb) => toHex(atFullBrightness(rgb));

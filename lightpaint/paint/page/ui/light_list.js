@@ -2,7 +2,7 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
-import { Button, Select, TruncatedText } from './controls.js';
+import { Button, Select, TruncatedText, Slider } from './controls.js';
 import { toggleLights } from './lamps/light_selection.js';
 import {
   MAX_ROWS_WITH_SLIDERS,
@@ -15,21 +15,18 @@ import {
   sortLights,
 } from './lamps/listed_lights.js';
 import { ConsoleRow } from './lamps/console_row.js';
-import { MasterDimmer } from './lamps/master_dimmer.js';
 import { StartLamps } from './lamps/start_lamps.js';
 import { VirtualRows } from './lamps/virtual_rows.js';
 import { GroupDimmer, SelectionPanel, levelsText } from './lamps/selection_panel.js';
 import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
-import { lightCountText, percentText } from './format.js';
+import { lightCountText, percentText, stopsText } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isAnswerHidden } from './look_actions.js';
 import { ImageRow } from './images/image_row.js';
 import { LightRow, RENDERING_TIP } from './light_row.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 const SORTS = [
   { value: 'scene', label: t('Scene') },
@@ -183,5 +180,24 @@ function Group({ name, ui, app, members, isMany }) {
     </div>
     ${rendering && html`<span class="rendering faint" data-tip=${RENDERING_TIP}>${rendering}</span>`}
     ${open && renderRows(ui, app, members, isMany, name)}
+  </div>`;
+}
+
+const TIP = t(
+  'Dims what is shown and exported. The painting, the solve and the levels below stay as they are.',
+);
+
+/** @param {{ui: Ui, app: App}} props */
+function MasterDimmer({ ui, app }) {
+  const { master } = ui;
+  const isFull = master === 1;
+  const stops = master > 0 ? stopsText(Math.log2(master)) : t('off');
+  const set = (/** @type {number} */ percent, /** @type {boolean} */ isFinal) =>
+    void app.session.setMaster(percent / 100, isFinal);
+  return html`<div class=${`master ${isFull ? '' : 'is-set'}`} role="group" aria-label=${t('Master dimmer')}>
+    <${Slider} label=${t('Master')} value=${100 * master} min=${0} max=${200} step=${1} unit="%"
+      resetValue=${100} tip=${TIP} text=${`${percentText(master)}, ${stops}`} change=${set} />
+    <span class="stops" aria-hidden="true">${isFull ? '' : stops}</span>
+    ${!isFull && html`<${Button} icon="undo" tip=${t('Master to 100 %')} act=${() => set(100, true)} />`}
   </div>`;
 }

@@ -1,7 +1,7 @@
 /** A row of the light list: the light in the answer, solo, mute, lock and dimmer. */
 
 import { Component, html } from '../vendor/preact.js';
-import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
+import { atFullBrightness, luminance, toHex, toKelvin } from '../../../viewer/drawing/colour.js';
 import { LightConstraints } from './light_constraints.js';
 import { numberText, percentText, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
@@ -10,7 +10,10 @@ import { isSelecting, pressLight } from './lamps/light_selection.js';
 import { DIMMER_MIN_STOPS, scaleToLevel, presentLevel, stopsOf } from './level_field.js';
 import { Dimmer, DisplayButtons, LightValue, LockButton, Pick, Share } from './row_parts.js';
 import { Thumbnail } from './thumbnail.js';
+import { toggled } from './ui_store.js';
 import { t } from '../language/language.js';
+
+/** @import { App, Constraints, Light, LightAnswer, RGB, Ui, UiStore } from './ui_state.js' */
 
 /** Share of the picture's light from which a lamp's tint is named: nobody sees the tint of a dimmer one.
  * A share that is shown as 3 % is less. */
@@ -21,17 +24,10 @@ export const RENDERING_TIP = t(
   'How this light renders colours: colour temperature, distance from white, Ra and R9 of CIE 13.3, Rf and Rg of TM-30',
 );
 
-/** @typedef {import("./ui_state.js").Light} Light */
-/** @typedef {import("./ui_state.js").LightAnswer} LightAnswer */
-/** @typedef {import("./ui_state.js").Constraints} Constraints */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./shortcuts.js").App} App */
-/**
- * @typedef {{k: number, light: Light, app: App, rgb: RGB, answer?: LightAnswer, constraints?: Constraints,
+/** @typedef {{k: number, light: Light, app: App, rgb: RGB, answer?: LightAnswer, constraints?: Constraints,
  *   tie?: string[], isKept: boolean, isLive: boolean, isSelected: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
  *   pointerShare?: number, hasSlider: boolean, picture: string, thumb?: number, allLights?: Light[],
- *   ui?: import("./ui_state.js").Ui}} Props
- */
+ *   ui?: Ui}} Props */
 
 /** @extends {Component<Props>} */
 export class LightRow extends Component {
@@ -217,13 +213,10 @@ function KeptButton({ k, light, app }) {
     >${t('kept')}</button>`;
 }
 
-/** @param {import("./ui_state.js").UiStore} store @param {number} k */
+/** @param {UiStore} store @param {number} k */
 function toggleRow(store, k) {
   store.set(({ openLights }) => ({ openLights: toggled(openLights, k) }));
 }
-
-/** Return a list with an entry or, where it has it, without. @param {number[]} list @param {number} k */
-const toggled = (list, k) => (list.includes(k) ? list.filter((other) => other !== k) : [...list, k]);
 
 /** Return the colour constraint, if there is one. @param {Constraints} constraints */
 const colourConstraint = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
@@ -243,9 +236,7 @@ function listRemarks({ light, answer, constraints = {}, tie, isKept }) {
     [
       tie,
       t('tied'),
-      t('It is tied to {value}', {
-        value: tie?.filter((name) => name !== light.name).join(', '),
-      }),
+      t('It is tied to {value}', { value: tie?.filter((name) => name !== light.name).join(', ') }),
     ],
     [answer?.is_unreached, t('unseen'), t('None of its light reaches the picture')],
   ];

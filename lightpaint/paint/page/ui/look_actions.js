@@ -1,14 +1,9 @@
 /** Saving and loading of looks, and which look equals the current state. */
 
-import { outputWeights } from './lamps/lamp_state.js';
 import { isElsewhere, weightsIn } from './look_comparison.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Look, RGB, Ui, UiStore } from './ui_state.js' */
 
 /** Largest difference between equal answers, relative to the brightest light: round-off of sums in
  * another order. */
@@ -41,11 +36,9 @@ export async function loadLook({ session, store }, look) {
   if (reply?.kind === 'patch' || reply?.kind === 'state') noteLastLook(store, look);
 }
 
-/**
- * Return the look that equals the current state: the one last saved or loaded, if nothing has
+/** Return the look that equals the current state: the one last saved or loaded, if nothing has
  * changed since; else one with the answer's lights, as after undo.
- * @param {Ui} ui @returns {number | null}
- */
+ * @param {Ui} ui @returns {number | null} */
 export function currentLook(ui) {
   const { looks, lastLook, version, history } = ui;
   const weights = outputWeights(ui);
@@ -64,11 +57,9 @@ export function currentLook(ui) {
   return (candidates.find(({ id }) => id === lastLook?.look) ?? candidates[0])?.id ?? null;
 }
 
-/**
- * Return which of two compared looks equals the answer, so that statements on the answer apply to
+/** Return which of two compared looks equals the answer, so that statements on the answer apply to
  * it. Null if neither does, or none are compared.
- * @param {Ui} ui @returns {Look | null}
- */
+ * @param {Ui} ui @returns {Look | null} */
 export function comparedAnswer(ui) {
   const current = ui.mix && currentLook(ui);
   if (!ui.mix || current === null) return null;
@@ -80,6 +71,12 @@ export function comparedAnswer(ui) {
 /** Return whether two other looks are compared, so that the answer is not visible.
  * @param {Ui} ui */
 export const isAnswerHidden = (ui) => ui.mix !== null && !comparedAnswer(ui);
+
+/** Return the weights that lights shine at, under the master dimmer. @param {Ui} ui @returns {RGB[]} */
+const outputWeights = ({ weights, lights, master }) =>
+  weights.map(([r, g, b], k) =>
+    lights[k]?.is_fixed ? [r, g, b] : [master * r, master * g, master * b],
+  );
 
 /** @param {UiStore} store @param {number} look */
 function noteLastLook(store, look) {

@@ -7,10 +7,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { COMPARED_COUNT } from '../engine/picture_slots.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Display} Display */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
+/** @import { Display, Look, RGB, Ui } from './ui_state.js' */
 /** Two looks, by their ids, with a crossfade between them; more: further ones, with which they are
  * side by side without one.
  * @typedef {{a: number, b: number, share: number, more?: number[]}} Mix */

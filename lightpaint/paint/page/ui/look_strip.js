@@ -20,11 +20,10 @@ import {
 import { showWall } from './look_wall.js';
 import { Thumbnail } from './thumbnail.js';
 import { updateDisplay } from './tools.js';
+import { toggled } from './ui_store.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Look, Ui } from './ui_state.js' */
 
 /** @param {{ui: Ui, app: App}} props */
 export function LookStrip({ ui, app }) {
@@ -38,8 +37,6 @@ export function LookStrip({ ui, app }) {
   }, [looks.length, ui.ready]);
   const [marks, setMarks] = useState(/** @type {number[]} */ ([]));
   const marked = marks.filter((id) => looks.some((look) => look.id === id));
-  const toggle = (/** @type {number} */ id) =>
-    setMarks(marked.includes(id) ? marked.filter((other) => other !== id) : [...marked, id]);
   const current = currentLook(ui);
   const kind = !looks.length ? 'is-empty' : ui.mix ? 'is-comparing' : '';
   return html`<section class=${`looks ${kind}`} aria-label=${t('Looks')}><div class="looks-row">
@@ -48,7 +45,7 @@ export function LookStrip({ ui, app }) {
       html`<ul ref=${list}>${looks.map(
         (look) => html`<${LookItem} key=${look.id} look=${look} isCurrent=${look.id === current}
           isMarked=${marked.includes(look.id)} canMark=${looks.length > 1 && marked.length < COMPARED_COUNT}
-          mark=${() => toggle(look.id)} ui=${ui} app=${app} />`,
+          mark=${() => setMarks(toggled(marked, look.id))} ui=${ui} app=${app} />`,
       )}</ul>`
     }
     ${

@@ -6,9 +6,7 @@ import { currentLook, loadLook } from './look_actions.js';
 import { comparedLooks, isPending, resetMix } from './look_comparison.js';
 import { updateDisplay } from './tools.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Look, Ui } from './ui_state.js' */
 /** @typedef {{width: number, height: number}} Size in CSS pixels */
 /** @typedef {{x: number, y: number}} Place in the window */
 
@@ -106,11 +104,9 @@ function Wall({ ui, app, looks }) {
     )}</div>`;
 }
 
-/**
- * Pan all pictures by a drag, and zoom them by two fingers or by Ctrl and the wheel.
+/** Pan all pictures by a drag, and zoom them by two fingers or by Ctrl and the wheel.
  * @param {{current: HTMLElement | null}} frame @param {App} app
- * @returns {() => boolean} whether the last press has moved the pictures
- */
+ * @returns {() => boolean} whether the last press has moved the pictures */
 function usePanning(frame, { store, engine }) {
   const hasMoved = useRef(false);
   useLayoutEffect(() => {

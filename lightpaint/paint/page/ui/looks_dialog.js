@@ -4,20 +4,17 @@ import { nameInView } from '../engine/message_frames.js';
 import { html, useRef, useState } from '../vendor/preact.js';
 import { COMPARED_COUNT } from '../engine/picture_slots.js';
 import { Button, Checkbox, Choice, Dialog, Select } from './controls.js';
+import { saveFile } from './exports/export_fields.js';
 import { LampTable } from './lamp_table.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { showWall } from './look_wall.js';
 import { sheetStyle, Thumbnail } from './thumbnail.js';
+import { toggled } from './ui_store.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Look, Ui } from './ui_state.js' */
 
-const PARTS = [
-  { value: 'pictures', label: t('Pictures') },
-  { value: 'lamps', label: t('Lamps') },
-];
+const PARTS = [{ value: 'pictures', label: t('Pictures') }, { value: 'lamps', label: t('Lamps') }];
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 export function LooksDialog({ ui, app, close }) {
@@ -37,8 +34,6 @@ function ContactSheet({ ui, app, close }) {
   const sheet = useRef(/** @type {HTMLElement | null} */ (null));
   const current = currentLook(ui);
   const [marked, setMarked] = useState(/** @type {number[]} */ ([]));
-  const mark = (/** @type {number} */ id, /** @type {boolean} */ isMarked) =>
-    setMarked(isMarked ? [...marked, id] : marked.filter((other) => other !== id));
   const load = (/** @type {number} */ id) => {
     close();
     void loadLook(app, id);
@@ -55,7 +50,7 @@ function ContactSheet({ ui, app, close }) {
           <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
           <span>${look.name}</span></button>
           <${Checkbox} label=${t('Compare {name}', { name: look.name })} hidden
-            checked=${marked.includes(look.id)} change=${(/** @type {boolean} */ on) => mark(look.id, on)}
+            checked=${marked.includes(look.id)} change=${() => setMarked(toggled(marked, look.id))}
             disabled=${marked.length >= COMPARED_COUNT && !marked.includes(look.id)} /></li>`;
       })}
     </ul>
@@ -90,14 +85,7 @@ function saveSheet(sheet, looks) {
     context.drawImage(pictures[k], x, y);
     context.fillText(name, x, y + height + 20, width);
   });
-  canvas.toBlob((blob) => {
-    if (!blob) return;
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(blob);
-    link.download = 'looks.png';
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
+  canvas.toBlob((blob) => blob && saveFile(blob, 'looks.png'));
 }
 
 /** @param {{ui: Ui}} props */

@@ -1,16 +1,14 @@
 /** Notices: toasts, banners about the connection, running tasks, tool tips. */
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
-import { Button } from './controls.js';
+import { Button, ProgressBar } from './controls.js';
 import { runningRender } from './exports/render_state.js';
 import { progressText } from './format.js';
 import { Icon } from './icons.js';
-import { keysText } from './key_names.js';
-import { ProgressBar } from './progress_bar.js';
+import { keysText } from './key_bindings.js';
 import { plural, t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 /** @param {{ui: Ui, app: App}} props */
 export function Toasts({ ui, app }) {
@@ -69,11 +67,9 @@ function ReconnectButton({ ui, app }) {
   return html`<${Button} label=${t('Reload the page')} primary act=${() => location.reload()} />`;
 }
 
-/**
- * Running tasks: those that a user started, a basis that renders, and pictures that load. Short
+/** Running tasks: those that a user started, a basis that renders, and pictures that load. Short
  * while the pointer is on a picture, since the line then describes the light there.
- * @param {{ui: Ui, app: App}} props
- */
+ * @param {{ui: Ui, app: App}} props */
 export function RunningTasks({ ui, app }) {
   if (!ui.ready) return null;
   return html`${runningTasks(ui, app).map(({ name, progress, text, end, stop, stopText, stopTip }) => {

@@ -1,17 +1,13 @@
 /** The outline of the object that a click would fill, or that a drag adjusts. */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
+import { devicePane, fitCanvas, placesOf } from './pane_canvas.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./engine_interface.js").Objects} Objects */
-/** @typedef {import("./engine_interface.js").Pane} Pane */
-/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @import { Engine, Pane, Ui } from './ui_state.js' */
+/** @typedef {NonNullable<ReturnType<Engine["objects"]>>} Objects */
 
 /** White inside the object and dark around it, so that it is visible on any picture. */
-const [INSIDE_COLOUR, OUTSIDE_COLOUR] = [
-  [255, 255, 255, 255],
-  [0, 0, 0, 180],
-];
+const [INSIDE_COLOUR, OUTSIDE_COLOUR] = [[255, 255, 255, 255], [0, 0, 0, 180]];
 
 /** Index of the object that a press affects or would affect; null for none. @param {Ui} ui */
 function objectOf({ tool, adjustedArea, probe, selection }) {
@@ -27,12 +23,9 @@ function objectOf({ tool, adjustedArea, probe, selection }) {
 export function ObjectOutline({ ui, engine, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const object = objectOf(ui);
-  const places = panes.map(({ x, y, width, height, left, top, scale }) =>
-    [x, y, width, height, left, top, scale].join(' '),
-  );
   useLayoutEffect(() => {
     if (ref.current && object !== null) draw(ref.current, engine.objects(), object, panes);
-  }, [object, ui.view, places.join()]);
+  }, [object, ui.view, placesOf(panes)]);
   // Fainter during a drag, so that its effect is visible.
   return html`<canvas class=${ui.dragAdjustment ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
     aria-hidden="true"></canvas>`;
@@ -42,23 +35,13 @@ export function ObjectOutline({ ui, engine, panes }) {
  * @param {HTMLCanvasElement} canvas @param {Objects | null} objects @param {number} object
  * @param {Pane[]} panes */
 function draw(canvas, objects, object, panes) {
-  const ratio = Math.max(1, window.devicePixelRatio || 1);
-  canvas.width = Math.round(canvas.clientWidth * ratio);
-  canvas.height = Math.round(canvas.clientHeight * ratio);
-  const context = canvas.getContext('2d');
+  const { context, ratio } = fitCanvas(canvas);
   const box = objects && boxOf(objects, object);
   if (!context || !box) return;
   for (const pane of panes) {
-    const outline = createOutline(objects, object, box, scalePane(pane, ratio), Math.round(ratio));
+    const outline = createOutline(objects, object, box, devicePane(pane, ratio), Math.round(ratio));
     if (outline) context.putImageData(outline.image, outline.x, outline.y);
   }
-}
-
-/** In device pixels. @param {Pane} pane @param {number} ratio @returns {Pane} */
-function scalePane(pane, ratio) {
-  const lengths = ['x', 'y', 'width', 'height', 'left', 'top', 'scale'];
-  const scaledLengths = lengths.map((key) => [key, /** @type {any} */ (pane)[key] * ratio]);
-  return { ...pane, ...Object.fromEntries(scaledLengths) };
 }
 
 /** @typedef {[left: number, top: number, right: number, bottom: number]} Box */

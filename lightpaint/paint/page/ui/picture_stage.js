@@ -4,7 +4,7 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
-import { toHex } from './paint_colour.js';
+import { toHex } from '../../../viewer/drawing/colour.js';
 import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
 import { lightCountText, percentText } from './format.js';
 import { useStageInput } from './stage_input.js';
@@ -25,15 +25,10 @@ import { PlanesOverlay } from './planes/plane_overlay.js';
 import { PairMarks } from './references/reference_picture.js';
 import { LampLasso } from './lamps/lamp_lasso.js';
 import { Legend } from './analysis_panel.js';
-import { ProgressBar } from './progress_bar.js';
-import { Button } from './controls.js';
+import { Button, ProgressBar } from './controls.js';
 import { plural, t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./engine_interface.js").Pane} Pane */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Look, Pane, Tool, Ui } from './ui_state.js' */
 
 /** @type {Record<string, string>} */
 const NAMES = {
@@ -80,7 +75,7 @@ function nameOf(ui, kind) {
 }
 
 /** Return the name of a look, and whether its lights are still shown where they hang now.
- * @param {Ui} ui @param {import("./ui_state.js").Look} look */
+ * @param {Ui} ui @param {Look} look */
 const lookText = (ui, look) =>
   isPending(ui, look) ? t('{name}: moving its lights …', { name: look.name }) : look.name;
 
@@ -262,7 +257,7 @@ function Tag({ ui, app, pane, panes }) {
     }</span>`;
 }
 
-/** @param {{panes: Pane[], tool: import("./engine_interface.js").Tool}} props */
+/** @param {{panes: Pane[], tool: Tool}} props */
 function Hint({ panes, tool }) {
   const pane = panes.find((candidate) => candidate.kind === 'painting');
   if (!pane) return null;

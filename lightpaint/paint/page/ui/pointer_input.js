@@ -8,9 +8,7 @@ import { SelectDrag } from './selection/select_drag.js';
 import { updateDisplay, rememberPaint, pickPaint } from './tools.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./engine_interface.js").Point} Point */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @import { Engine, Kind, Pane, Point, Ui, UiStore } from './ui_state.js' */
 
 /** Within this time and distance a second finger cancels the stroke of the first. */
 const SECOND_FINGER_LIMITS = { ms: 250, px: 24 };
@@ -48,10 +46,8 @@ export class Pointer {
     return { x: event.clientX - left, y: event.clientY - top };
   }
 
-  /**
-   * Return the place in pixels of the picture, in the pane in which the stroke began.
-   * @param {PointerEvent} event @returns {Point & {kind: import("./engine_interface.js").Kind} | null}
-   */
+  /** Return the place in pixels of the picture, in the pane in which the stroke began.
+   * @param {PointerEvent} event @returns {Point & {kind: Kind} | null} */
   point(event) {
     const { x, y } = this.place(event);
     const pane = this.pane ?? paneAt(this.engine, x, y);
@@ -269,7 +265,7 @@ export class Pointer {
     event.preventDefault();
   }
 
-  /** @type {import("./engine_interface.js").Pane | null} */
+  /** @type {Pane | null} */
   pane = null;
 }
 
@@ -277,7 +273,7 @@ export class Pointer {
 const pairOf = ({ x, y }) => [x, y];
 
 /** Return whether the session receives no strokes from here.
- * @param {import("./ui_state.js").Ui} ui */
+ * @param {Ui} ui */
 const isSessionElsewhere = ({ closure, connection }) => closure !== null || connection === 'stale';
 
 /** @param {Engine} engine @param {number} x @param {number} y */

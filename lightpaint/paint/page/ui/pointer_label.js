@@ -1,15 +1,14 @@
 /** A label at the pointer: the adjustment of a drag, or the light that the picker would take. */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
-import { toHex } from './paint_colour.js';
+import { toHex } from '../../../viewer/drawing/colour.js';
 import { paintText } from './format.js';
 import { exposureOf } from './display_state.js';
 import { paneAt } from './pointer_input.js';
 import { luxAtPointer } from './planes/plane_overlay.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @import { Engine, Ui } from './ui_state.js' */
 
 /** @param {{ui: Ui, engine: Engine, rings: {current: HTMLElement | null}}} props */
 export function PointerLabel({ ui, engine, rings }) {

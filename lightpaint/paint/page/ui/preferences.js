@@ -5,24 +5,20 @@ import { validBindings } from './key_bindings.js';
 import { validOrder } from './panels/panel_order.js';
 import { THEMES } from './theme.js';
 
-/**
- * @typedef {object} Preferences
- * @property {import("./theme.js").Theme} theme
- * @property {import("./key_bindings.js").KeyBindings} keyBindings keys that differ from the default
- * @property {boolean} hasSeenTour
- * @property {string[]} panelOrder names of panels from top to bottom; empty: as the page has them
- */
+/** @import { KeyBindings } from './key_bindings.js' */
+/** @import { Theme } from './theme.js' */
 
-/** @type {Preferences} */
 export const DEFAULT_PREFERENCES = {
-  theme: 'system',
-  keyBindings: {},
+  theme: /** @type {Theme} */ ('system'),
+  keyBindings: /** @type {KeyBindings} */ ({}), // keys that differ from the default
   hasSeenTour: false,
-  panelOrder: [],
+  // Names of panels from top to bottom; empty: as the page has them.
+  panelOrder: /** @type {string[]} */ ([]),
 };
 
-/** @type {(keyof Preferences)[]} */
-export const PREFERENCE_FIELDS = ['theme', 'keyBindings', 'hasSeenTour', 'panelOrder'];
+/** @typedef {typeof DEFAULT_PREFERENCES} Preferences */
+
+export const PREFERENCE_FIELDS = /** @type {(keyof Preferences)[]} */ (Object.keys(DEFAULT_PREFERENCES));
 
 /** Return what is valid of stored preferences. @param {Record<string, any>} stored
  * @returns {Partial<Preferences>} */

@@ -5,8 +5,7 @@ import { Button, Dialog, Select } from './controls.js';
 import { sheetStyle, Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 /** Value of the choice that leaves the subject to the painter. */
 const CENTRAL = '';

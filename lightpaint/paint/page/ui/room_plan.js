@@ -3,18 +3,81 @@
 import { html, useRef } from '../vendor/preact.js';
 import { AddLight } from './add_light.js';
 import { MoveButton } from './advice.js';
-import { endOnEscape } from './escape_key.js';
 import { dot, subtract, add, normalize, onRail } from './lamp_geometry.js';
 import { placeOf, shiftedTo } from './lamp_marks.js';
-import { PlanObjects } from './plan_objects.js';
-import { DRAG_MIN_PIXELS } from './lamps/mark_drag.js';
-import { atFullBrightness, luminance, toHex } from './paint_colour.js';
+import { DRAG_MIN_PIXELS, endOnEscape } from './lamps/mark_drag.js';
+import { atFullBrightness, luminance, toHex } from '../../../viewer/drawing/colour.js';
 import { t } from '../language/language.js';
+import { useId } from './controls.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("./lamp_geometry.js").Vector} Vector */
-/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
+/** @import { App, Ui } from './ui_state.js' */
+/** @import { Vector } from './lamp_geometry.js' */
+/** @import { LightPlace, Rig } from '../engine/messages.js' */
+
+/** @typedef {(point: number[]) => [number, number]} ToPlan */
+
+/** Width of a letter of a name on the plan, and height of a line, in CSS pixels. */
+const [LETTER, LINE] = [5.2, 9];
+
+/** Return the outline of an object on the plan. @param {[number, number][]} corners in the two axes
+ * beside the upward one @param {number} up @param {ToPlan} toPlan @returns {[number, number][]} */
+function outlineOnPlan(corners, up, toPlan) {
+  const [a, b] = [0, 1, 2].filter((axis) => axis !== up);
+  return corners.map((corner) => {
+    const point = [0, 0, 0];
+    [point[a], point[b]] = corner;
+    return toPlan(point);
+  });
+}
+
+/** Return where a name has room within its outline; null without room. @param {string} name
+ * @param {[number, number][]} outline */
+function labelPlace(name, outline) {
+  const [xs, ys] = [0, 1].map((c) => outline.map((corner) => corner[c]));
+  const [left, right] = [Math.min(...xs), Math.max(...xs)];
+  const [top, bottom] = [Math.min(...ys), Math.max(...ys)];
+  const hasRoom = right - left > LETTER * name.length + 4 && bottom - top > LINE;
+  return hasRoom ? { x: (left + right) / 2, y: (top + bottom) / 2 + 0.3 * LINE } : null;
+}
+
+/** @param {{rig: Rig, toPlan: ToPlan, room: string}} props room: its outline, which cuts off others */
+function PlanObjects({ rig, toPlan, room }) {
+  const id = useId();
+  if (!rig.objects.length) return null;
+  const names = [...new Set(rig.objects.map(({ name }) => name))].join(', ');
+  const outlines = rig.objects.map(({ name, corners }) => ({
+    name,
+    outline: outlineOnPlan(corners, rig.up, toPlan),
+  }));
+  const labels = labelsOf(outlines);
+  return html`<clipPath id=${id}><polygon points=${room} /></clipPath>
+  <g class="plan-objects" clip-path=${`url(#${id})`} role="img" aria-label=${t('Objects: {names}', { names })}>
+    ${outlines.map(
+      ({ name, outline }, k) =>
+        html`<polygon key=${k} points=${outline.join(' ')} data-tip=${name} />`,
+    )}
+    ${labels.map(({ name, x, y }) => html`<text key=${name} x=${x} y=${y}>${name}</text>`)}
+  </g>`;
+}
+
+/** Return the names that have room, each once and none over another.
+ * @param {{name: string, outline: [number, number][]}[]} outlines the largest first */
+function labelsOf(outlines) {
+  /** @type {{name: string, x: number, y: number}[]} */
+  const labels = [];
+  for (const { name, outline } of outlines) {
+    const place = labelPlace(name, outline);
+    const isFree = labels.every(
+      (other) =>
+        other.name !== name &&
+        (!place ||
+          Math.abs(place.y - other.y) > LINE ||
+          2 * Math.abs(place.x - other.x) > LETTER * (name.length + other.name.length)),
+    );
+    if (place && isFree) labels.push({ name, ...place });
+  }
+  return labels;
+}
 
 /** A drag of a light: where it hung, where the pointer pressed, and where the light is now.
  * @typedef {{light: number, place: LightPlace, x: number, y: number, position: Vector | null,
@@ -92,11 +155,7 @@ function CameraMark({ ui, toPlan }) {
   const [x, y] = toPlan(camera.origin).map((value, c) =>
     Math.min(Math.max(value, MARGIN), (c ? HEIGHT : WIDTH) - MARGIN / 2),
   );
-  const corners = [
-    [x, y],
-    [x - 6, y - 9],
-    [x + 6, y - 9],
-  ];
+  const corners = [[x, y], [x - 6, y - 9], [x + 6, y - 9]];
   return html`<polygon class="camera" points=${corners.join(' ')} data-tip=${t('Camera')}>
     <title>${t('Camera')}</title></polygon>`;
 }

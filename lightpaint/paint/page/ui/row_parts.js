@@ -5,12 +5,10 @@ import { Button, Slider } from './controls.js';
 import { percentText, stopsText } from './format.js';
 import { Icon } from './icons.js';
 import { DIMMER_MAX_STOPS, DIMMER_MIN_STOPS, LevelField, stopsOf } from './level_field.js';
-import { luminance } from './paint_colour.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Light} Light */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Light, RGB } from './ui_state.js' */
 
 /** The box in the corner of a row that selects it.
  * @param {{label: string, isSelected: boolean, select: (event: MouseEvent) => void}} props */
@@ -67,7 +65,7 @@ export function Dimmer({ light, rgb, label, app, isHeld, disabled = false, scale
 }
 
 /** Return stops within the ends of the dimmer. @param {number} stops */
-export const clampStops = (stops) => Math.min(DIMMER_MAX_STOPS, Math.max(DIMMER_MIN_STOPS, stops));
+const clampStops = (stops) => Math.min(DIMMER_MAX_STOPS, Math.max(DIMMER_MIN_STOPS, stops));
 
 /** @param {{share: number, pointerShare?: number}} props */
 export function Share({ share, pointerShare }) {

@@ -9,17 +9,18 @@ import { movablePlaces } from './state_updates.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Requests} Requests */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Constraints} Constraints */
+/** @import { Requests } from '../engine/messages.js' */
+/** @import { Change, Constraints, RGB, Ui } from './ui_state.js' */
+
+/** Progress of a search for places that has just begun. */
+const NO_STEPS = { task: 'place', done: 0, total: 0, unit: 'steps' };
 
 export class SessionController extends SessionLink {
   lampMoves = new LampMoves(this);
   many = new ManyLights(this);
   images = new ImageActions(this);
 
-  /**
-   * Set the constraints on a light.
+  /** Set the constraints on a light.
    * @param {number} light @param {Constraints} constraints @param {boolean} [isFinal] false while a slider moves
    */
   async constrainLight(light, constraints, isFinal = true) {
@@ -44,11 +45,9 @@ export class SessionController extends SessionLink {
     return reply;
   }
 
-  /**
-   * Set a light by its slider and lock it there; the others are solved around it. The page shows it
+  /** Set a light by its slider and lock it there; the others are solved around it. The page shows it
    * at once. One message is pending at a time, and the next carries the newest level.
-   * @param {number} light @param {RGB} emission @param {boolean} isFinal
-   */
+   * @param {number} light @param {RGB} emission @param {boolean} isFinal */
   lockLight(light, emission, isFinal) {
     const { weights } = this.store.value;
     this.noteUnlocked(light);
@@ -128,20 +127,18 @@ export class SessionController extends SessionLink {
     return this.constrainLight(light, { off: true });
   }
 
-  /** Tie two lights. @param {string} name @param {string} otherName */
-  tie(name, otherName) {
+  /** Put lights, and all that is tied to them, on one dimmer. @param {string[]} names */
+  tie(names) {
     const { ties } = this.store.value;
-    const joinedNames = ties.filter((tie) => tie.includes(name) || tie.includes(otherName)).flat();
-    const otherTies = ties.filter((tie) => !tie.includes(name) && !tie.includes(otherName));
-    return this.tieAll([...otherTies, [...new Set([...joinedNames, name, otherName])]]);
+    const isJoined = (/** @type {string[]} */ tie) => tie.some((name) => names.includes(name));
+    const joined = [...new Set([...ties.filter(isJoined).flat(), ...names])];
+    return this.tieAll([...ties.filter((tie) => !isJoined(tie)), joined]);
   }
 
-  /** @param {string} name */
-  untie(name) {
-    const remainingTies = this.store.value.ties.map((tie) =>
-      tie.filter((member) => member !== name),
-    );
-    return this.tieAll(remainingTies.filter((tie) => tie.length > 1));
+  /** Take lights off their dimmers. @param {string[]} names */
+  untie(names) {
+    const ties = this.store.value.ties.map((tie) => tie.filter((name) => !names.includes(name)));
+    return this.tieAll(ties.filter((tie) => tie.length > 1));
   }
 
   /** @param {string[][]} ties */
@@ -174,7 +171,7 @@ export class SessionController extends SessionLink {
   }
 
   /** Request a preview of a change. @param {string} label its name
-   * @param {import("./ui_state.js").Change} change */
+   * @param {Change} change */
   preview(label, change) {
     this.previewCount += 1;
     const number = this.previewCount;
@@ -210,7 +207,7 @@ export class SessionController extends SessionLink {
   }
 
   /** Keep the exposure at which the map of an image is shown, unless it is kept already.
-   * @param {import("./images/image_state.js").LightImage} image */
+   * @param {import("./images/light_images.js").LightImage} image */
   keepExposure(image) {
     this.store.set((ui) => ({
       mapExposures: { ...ui.mapExposures, [image.name]: exposureOf(ui, image) },
@@ -239,10 +236,7 @@ export class SessionController extends SessionLink {
     if (!run) return this.send('place', { run });
     if (!areLampsMarked) this.toggleLamps();
     this.awaitsGhosts = !rig;
-    this.store.set({
-      placementProgress: { task: 'place', done: 0, total: 0, unit: 'steps' },
-      ghosts: rig ? movablePlaces(rig, lights) : {},
-    });
+    this.store.set({ placementProgress: NO_STEPS, ghosts: rig ? movablePlaces(rig, lights) : {} });
     return this.send('place', { run });
   }
 
@@ -270,14 +264,11 @@ export class SessionController extends SessionLink {
     return this.send('remove_light', { name });
   }
 
-  /** Search for places of new lights. @param {import("./ui_state.js").Ui["newLight"]} newLight */
+  /** Search for places of new lights. @param {Ui["newLight"]} newLight */
   findLights({ type, surface, count }) {
     const { areLampsMarked } = this.store.value;
     if (!areLampsMarked) this.toggleLamps();
-    this.store.set({
-      placementProgress: { task: 'place', done: 0, total: 0, unit: 'steps' },
-      ghosts: {},
-    });
+    this.store.set({ placementProgress: NO_STEPS, ghosts: {} });
     const surfaces = surface === 'anywhere' ? [] : [surface];
     return this.send('place', { run: true, new_type: type, max_count: count, surfaces });
   }

@@ -19,55 +19,49 @@ import { referencesUpdate } from './references/reference_state.js';
 import { updateDisplay } from './tools.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Host} Host */
-/** @typedef {import("./engine_interface.js").Message} Message */
-/** @typedef {import("./engine_interface.js").Requests} Requests */
-/** @typedef {import("./engine_interface.js").HostEvents} HostEvents */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Constraints} Constraints */
-/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
+/** @import { Constraints, Host, Message, RGB, Ui, UiStore } from './ui_state.js' */
+/** @import { LightPlace, Requests } from '../engine/messages.js' */
+/** @import { HostEvents } from '../engine/socket_host.js' */
 
-/** @type {(keyof HostEvents)[]} */
-const EVENT_KINDS = [
-  'state',
-  'waiting',
-  'answer',
-  'patch',
-  'selected',
-  'renewed',
-  'rig',
-  'trial',
-  'placed',
-  'progress',
-  'stopped',
-  'notice',
-  'failed',
-  'looks',
-  'references',
-  'choices',
-  'exported',
-  'renders',
-  'console',
-  'verified',
-  'explained',
-  'previewed',
-  'closed',
-  'connection',
-  'silence',
-];
+/** What each message changes in the state of the interface.
+ * @type {{[K in keyof HostEvents]?:
+ *   (message: HostEvents[K], ui: Ui, link: SessionLink) => Partial<Ui> | void}} */
+const UPDATES = {
+  state: stateUpdate,
+  waiting: ({ text, progress }) => ({
+    ...{ ready: false, state: null, waitReason: text ?? '', basis: progress ?? null },
+    ...IDLE,
+  }),
+  answer: answerUpdate,
+  patch: answerUpdate,
+  selected: ({ history }) => (history ? { history } : {}),
+  renewed: ({ resources }, ui) => ({ resources: { ...ui.resources, ...resources } }),
+  rig: (rig, _, link) => link.takeRig(rig),
+  trial: (trial, ui) => (ui.placementProgress ? { trial } : {}),
+  placed: (message, _, link) => link.takePlacement(message),
+  progress: progressUpdate,
+  stopped: ({ task }, _, link) => link.resetTask(task),
+  notice: (message, _, link) => link.showNotice(message),
+  failed: ({ text, tone }, _, link) => link.toast(text, tone ?? 'warn'),
+  looks: looksUpdate,
+  references: referencesUpdate,
+  choices: choicesUpdate,
+  exported: (message, _, link) => link.takeExport(message),
+  renders: (message, _, link) => link.takeRenders(message),
+  console: ({ console }) => ({ console }),
+  verified: verificationUpdate,
+  explained: explanationUpdate,
+  previewed: previewUpdate,
+  closed: ({ reason, text }) => ({ closure: { reason, text } }),
+  connection: ({ state }) => ({ connection: state }),
+  silence: ({ isSilent }) => ({ isSilent }),
+};
 
 /** State that a refused request returns to. */
-const CONFIRMED_KEYS = /** @type {const} */ ([
-  'constraints',
-  'ties',
-  'settings',
-  'weights',
-  'master',
-]);
+const CONFIRMED_KEYS = /** @type {const} */ (['constraints', 'ties', 'settings', 'weights', 'master']);
 
 export class SessionLink {
-  /** @param {Host} host @param {import("./ui_state.js").UiStore} store */
+  /** @param {Host} host @param {UiStore} store */
   constructor(host, store) {
     this.host = host;
     this.store = store;
@@ -92,17 +86,15 @@ export class SessionLink {
     /** The number of previews so far. */
     this.previewCount = 0;
     /** The state that the session has confirmed, to return to when it refuses a request.
-     * @type {Pick<Ui, 'constraints' | 'ties' | 'settings' | 'weights' | 'master'>} */
+     * @type {Pick<Ui, typeof CONFIRMED_KEYS[number]>} */
     this.confirmedState = { constraints: {}, ties: [], settings: {}, weights: [], master: 1 };
-    for (const kind of EVENT_KINDS)
-      host.on(kind, (message) => this.receive({ ...message, kind }, message));
+    for (const kind of /** @type {(keyof HostEvents)[]} */ (Object.keys(UPDATES)))
+      host.on(kind, (/** @type {any} */ message) => this.receive({ ...message, kind }, message));
   }
 
-  /**
-   * Send a request. An error is shown as a toast.
+  /** Send a request. An error is shown as a toast.
    * @template {keyof Requests} K @param {K} kind @param {Requests[K]} [fields]
-   * @returns {Promise<Message | null>}
-   */
+   * @returns {Promise<Message | null>} */
   async send(kind, fields) {
     try {
       const reply = await this.host.send(kind, fields);
@@ -120,48 +112,8 @@ export class SessionLink {
   receive(message, origin = message) {
     if (this.handledMessages.has(origin)) return;
     this.handledMessages.add(origin);
-    const changes = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
-      state: (/** @type {HostEvents['state']} */ m) => stateUpdate(m, this.store.value),
-      waiting: (/** @type {HostEvents['waiting']} */ m) => ({
-        ready: false,
-        state: null,
-        waitReason: m.text ?? '',
-        basis: m.progress ?? null,
-        ...IDLE,
-      }),
-      answer: (/** @type {HostEvents['answer']} */ m) => answerUpdate(m, this.store.value),
-      patch: (/** @type {HostEvents['patch']} */ m) => answerUpdate(m, this.store.value),
-      selected: (/** @type {HostEvents['selected']} */ m) =>
-        m.history ? { history: m.history } : {},
-      renewed: (/** @type {HostEvents['renewed']} */ m) => ({
-        resources: { ...this.store.value.resources, ...m.resources },
-      }),
-      rig: (/** @type {HostEvents['rig']} */ m) => this.takeRig(m),
-      trial: (/** @type {HostEvents['trial']} */ m) =>
-        this.store.value.placementProgress ? { trial: m } : {},
-      placed: (/** @type {HostEvents['placed']} */ m) => this.takePlacement(m),
-      progress: (/** @type {HostEvents['progress']} */ m) => progressUpdate(m, this.store.value),
-      stopped: (/** @type {HostEvents['stopped']} */ m) => this.resetTask(m.task),
-      notice: (/** @type {HostEvents['notice']} */ m) => this.showNotice(m),
-      failed: (/** @type {HostEvents['failed']} */ m) => this.toast(m.text, m.tone ?? 'warn'),
-      looks: (/** @type {HostEvents['looks']} */ m) => looksUpdate(m, this.store.value),
-      references: (/** @type {HostEvents['references']} */ m) =>
-        referencesUpdate(m, this.store.value),
-      choices: (/** @type {HostEvents['choices']} */ m) => choicesUpdate(m, this.store.value),
-      exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
-      renders: (/** @type {HostEvents['renders']} */ m) => this.takeRenders(m),
-      console: (/** @type {HostEvents['console']} */ m) => ({ console: m.console }),
-      verified: (/** @type {HostEvents['verified']} */ m) =>
-        verificationUpdate(m, this.store.value),
-      explained: (/** @type {HostEvents['explained']} */ m) =>
-        explanationUpdate(m, this.store.value),
-      previewed: (/** @type {HostEvents['previewed']} */ m) => previewUpdate(m, this.store.value),
-      closed: (/** @type {HostEvents['closed']} */ m) => ({
-        closure: { reason: m.reason, text: m.text },
-      }),
-      connection: (/** @type {HostEvents['connection']} */ m) => ({ connection: m.state }),
-      silence: (/** @type {HostEvents['silence']} */ m) => ({ isSilent: m.isSilent }),
-    })[message.kind]?.(message);
+    const update = UPDATES[/** @type {keyof HostEvents} */ (message.kind)];
+    const changes = update?.(/** @type {any} */ (message), this.store.value, this);
     for (const key of CONFIRMED_KEYS)
       if (changes?.[key] !== undefined) Object.assign(this.confirmedState, { [key]: changes[key] });
     if (changes?.weights) changes.weights = this.applyMoves(changes.weights);

@@ -5,12 +5,11 @@
 
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Choice, NumberField, Select, useId } from './controls.js';
-import { numberText } from './format.js';
+import { capitalized, numberText } from './format.js';
 import { language, languageChoices, storeLanguage, t } from '../language/language.js';
 import { startTour } from './tour.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 const AUTOMATIC_TIP = t('The best choice for a painting made here');
 
@@ -30,16 +29,8 @@ const SPACES = [
 const COLOURS = [
   { value: null, label: t('Automatic'), tip: AUTOMATIC_TIP },
   { value: 'free', label: t('Free'), tip: t('Any colour') },
-  {
-    value: 'gentle',
-    label: t('Gentle'),
-    tip: t('Their own, unless the paint asks for another'),
-  },
-  {
-    value: 'white',
-    label: t('White'),
-    tip: t('Whites from 2200 to 9000 K'),
-  },
+  { value: 'gentle', label: t('Gentle'), tip: t('Their own, unless the paint asks for another') },
+  { value: 'white', label: t('White'), tip: t('Whites from 2200 to 9000 K') },
   {
     value: 'own',
     label: t('Own'),
@@ -48,44 +39,20 @@ const COLOURS = [
 ];
 const HOLDS = [
   { value: 'auto', label: t('Automatic'), tip: AUTOMATIC_TIP },
-  {
-    value: 'hold',
-    label: t('Hold'),
-    tip: t('They stay near their current look'),
-  },
-  {
-    value: 'go',
-    label: t('Ignore'),
-    tip: t('They may change freely: only the paint counts'),
-  },
+  { value: 'hold', label: t('Hold'), tip: t('They stay near their current look') },
+  { value: 'go', label: t('Ignore'), tip: t('They may change freely: only the paint counts') },
 ];
 const PAINT_READINGS = [
-  {
-    value: false,
-    label: t('Sketch'),
-    tip: t('Strokes show what should change'),
-  },
-  {
-    value: true,
-    label: t('Literal'),
-    tip: t('Each stroke is the exact light you want'),
-  },
+  { value: false, label: t('Sketch'), tip: t('Strokes show what should change') },
+  { value: true, label: t('Literal'), tip: t('Each stroke is the exact light you want') },
 ];
 const THEMES = [
-  {
-    value: 'system',
-    label: t('System'),
-    tip: t('As the system, or the notebook around it'),
-  },
+  { value: 'system', label: t('System'), tip: t('As the system, or the notebook around it') },
   { value: 'dark', label: t('Dark') },
   { value: 'light', label: t('Light', { context: 'theme' }) },
 ];
 const MINOR_LIGHTS = [
-  {
-    value: false,
-    label: t('May change'),
-    tip: t('Every change that brings the answer closer'),
-  },
+  { value: false, label: t('May change'), tip: t('Every change that brings the answer closer') },
   { value: true, label: t('Stay'), tip: t('As they are now, unless a change helps much') },
 ];
 
@@ -198,10 +165,8 @@ function PageSettings({ ui, app }) {
     }`;
 }
 
-/**
- * The panel over the side panels. It takes the focus and returns it when closed; Escape closes it.
- * @param {{labelledby: string, close: () => void, children?: any}} props
- */
+/** The panel over the side panels. It takes the focus and returns it when closed; Escape closes it.
+ * @param {{labelledby: string, close: () => void, children?: any}} props */
 function Panel({ labelledby, close, children }) {
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
   useLayoutEffect(() => {
@@ -233,7 +198,7 @@ function Row({ title, description, children }) {
 /** The current value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function describeSource(isAuto, text = '') {
-  return isAuto && text ? t('Now: {text}', { text }) : text.charAt(0).toUpperCase() + text.slice(1);
+  return isAuto && text ? t('Now: {text}', { text }) : capitalized(text);
 }
 
 /** The setting for unpainted parts. @param {number | null | undefined} hold */

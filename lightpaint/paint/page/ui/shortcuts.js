@@ -1,8 +1,7 @@
 /** The table of keyboard shortcuts, for the keyboard and for the dialog that lists them. */
 
 import { saveLook } from './look_actions.js';
-import { showOriginal } from './original_scene.js';
-import { showPrevious } from './previous_answer.js';
+import { showOriginal, showPrevious } from './held_pictures.js';
 import { swapInset } from './inset_picture.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { t } from '../language/language.js';
@@ -21,10 +20,8 @@ import {
   TOOLS,
 } from './tools.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./session_controller.js").SessionController} SessionController */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {{store: UiStore, session: SessionController, engine: Engine}} App */
+/** @import { App } from './ui_state.js' */
+
 /** A command with its key, or something that keys and pointer do and nobody can change.
  * isOnce: ignores repeats of a held key.
  * @typedef {{command: import("./key_bindings.js").Command, description: string,
@@ -119,44 +116,15 @@ export const SHORTCUTS = [
   {
     title: t('Brush'),
     keys: [
-      {
-        command: 'smaller',
-        description: t('smaller'),
-        act: ({ store }) => resizeBrush(store, -1),
-      },
-      {
-        command: 'larger',
-        description: t('larger'),
-        act: ({ store }) => resizeBrush(store, 1),
-      },
-      {
-        command: 'softer',
-        description: t('softer'),
-        act: ({ store }) => hardenBrush(store, -1),
-      },
-      {
-        command: 'harder',
-        description: t('harder'),
-        act: ({ store }) => hardenBrush(store, 1),
-      },
+      { command: 'smaller', description: t('smaller'), act: ({ store }) => resizeBrush(store, -1) },
+      { command: 'larger', description: t('larger'), act: ({ store }) => resizeBrush(store, 1) },
+      { command: 'softer', description: t('softer'), act: ({ store }) => hardenBrush(store, -1) },
+      { command: 'harder', description: t('harder'), act: ({ store }) => hardenBrush(store, 1) },
       { symbols: ['1', '…', '9', '0'], description: t('flow 10 % to 100 %') },
-      {
-        command: 'swap',
-        description: t('swap colours'),
-        act: ({ store }) => swapColours(store),
-      },
-      {
-        symbols: ['Alt', t('click')],
-        description: t('pick light from the picture'),
-      },
-      {
-        symbols: ['Shift', t('click')],
-        description: t('line from the last stroke'),
-      },
-      {
-        symbols: ['Esc'],
-        description: t('cancel the stroke, or the drag of a light'),
-      },
+      { command: 'swap', description: t('swap colours'), act: ({ store }) => swapColours(store) },
+      { symbols: ['Alt', t('click')], description: t('pick light from the picture') },
+      { symbols: ['Shift', t('click')], description: t('line from the last stroke') },
+      { symbols: ['Esc'], description: t('cancel the stroke, or the drag of a light') },
       {
         command: 'undo',
         description: t('undo'),
@@ -166,11 +134,7 @@ export const SHORTCUTS = [
           else void session.send('undo');
         },
       },
-      {
-        command: 'redo',
-        description: t('redo'),
-        act: ({ session }) => void session.send('redo'),
-      },
+      { command: 'redo', description: t('redo'), act: ({ session }) => void session.send('redo') },
     ],
   },
   {
@@ -191,18 +155,9 @@ export const SHORTCUTS = [
         description: t('invert the selection'),
         act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
       },
-      {
-        symbols: ['Shift', t('drag')],
-        description: t('add to the selection'),
-      },
-      {
-        symbols: ['Alt', t('drag')],
-        description: t('subtract from it'),
-      },
-      {
-        symbols: ['Shift', 'Alt', t('drag')],
-        description: t('intersect with it'),
-      },
+      { symbols: ['Shift', t('drag')], description: t('add to the selection') },
+      { symbols: ['Alt', t('drag')], description: t('subtract from it') },
+      { symbols: ['Shift', 'Alt', t('drag')], description: t('intersect with it') },
     ],
   },
   {
@@ -217,22 +172,14 @@ export const SHORTCUTS = [
         description: t('fit to window'),
         act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
       },
-      {
-        command: 'pixels',
-        description: t('100 %'),
-        act: showPixels,
-      },
+      { command: 'pixels', description: t('100 %'), act: showPixels },
       {
         command: 'layout',
         description: t('side by side, wipe, blink, inset'),
         act: ({ store }) =>
           updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
       },
-      {
-        command: 'nextView',
-        description: t('next view, if there are several'),
-        act: showNextView,
-      },
+      { command: 'nextView', description: t('next view, if there are several'), act: showNextView },
       {
         command: 'blink',
         description: t('switch the picture in blink, the large one with an inset'),

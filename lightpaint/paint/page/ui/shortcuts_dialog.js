@@ -11,15 +11,15 @@ import {
   keysOf,
   pressedKeys,
   withKeys,
+  keyName,
 } from './key_bindings.js';
-import { keyName } from './key_names.js';
 import { SHORTCUTS } from './shortcuts.js';
 import { startTour } from './tour.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
-/** @typedef {import("./shortcuts.js").CommandKey} CommandKey */
-/** @typedef {import("./key_bindings.js").Command} Command */
+/** @import { App, Ui } from './ui_state.js' */
+/** @import { CommandKey } from './shortcuts.js' */
+/** @import { Command } from './key_bindings.js' */
+
 /** What is being changed: the command that waits for a key, and the one that was pressed if another
  * command has it. @typedef {{command: Command, keys?: string, other?: Command}} Recording */
 
@@ -72,12 +72,10 @@ const namesOf = (command, keys) => ({
   keys: keySymbols(keys).join(' '),
 });
 
-/**
- * A command: its key, which a press on it changes, and what it does.
+/** A command: its key, which a press on it changes, and what it does.
  * @param {{ui: Ui, entry: CommandKey, recording: Recording | null,
  *   setRecording: (recording: Recording | null) => void, setNote: (note: string) => void,
- *   set: (command: Command, keys: string) => void}} props
- */
+ *   set: (command: Command, keys: string) => void}} props */
 function CommandRow({ ui, entry, recording, setRecording, setNote, set }) {
   const { command, description } = entry;
   const own = recording?.command === command ? recording : null;

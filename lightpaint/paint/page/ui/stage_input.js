@@ -6,10 +6,8 @@ import { isTyping } from './keyboard.js';
 import { pointLamp } from './lamp_fields.js';
 import { paneAt } from './pointer_input.js';
 
-/** @typedef {import("./engine_interface.js").Engine} Engine */
-/** @typedef {import("./pointer_input.js").Pointer} Pointer */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App } from './ui_state.js' */
+/** @import { Pointer } from './pointer_input.js' */
 
 /** @param {import("../vendor/preact.js").Ref<HTMLElement | null>} frame @param {Pointer} pointer
  * @param {App} app */

@@ -1,9 +1,7 @@
 /** Changes of the interface state that follow from messages of the session. */
 
-/** @typedef {import('./engine_interface.js').Message} Message */
-/** @typedef {import('./engine_interface.js').RGB} RGB */
-/** @typedef {import('./ui_state.js').Ui} Ui */
-/** @typedef {import('../engine/messages.js').Events} Events */
+/** @import { Look, Message, Progress, RGB, Ui } from './ui_state.js' */
+/** @import { Events, Rig } from '../engine/messages.js' */
 
 import { stateOfView } from '../engine/message_frames.js';
 import { rendersUpdate } from './exports/render_state.js';
@@ -34,7 +32,7 @@ export const IDLE = {
 };
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
-export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ previous) {
+export function stateUpdate(message, /** @type {Ui} */ previous) {
   const isReconnected = previous.connection !== 'open' || previous.closure !== null;
   const views = message.views ?? [];
   const view = previous.view < views.length ? previous.view : 0;
@@ -143,7 +141,7 @@ export function looksUpdate({ looks, resources }, ui) {
 }
 
 /** Return whether a compared look no longer exists.
- * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
+ * @param {Look[]} looks @param {Ui} ui */
 function isLookMissing(looks, ui) {
   return ui.mix !== null && !comparedLooks({ ...ui, looks }, ui.mix);
 }
@@ -153,10 +151,8 @@ function transformDisplay(transform) {
   return transform ? { transform: transform.name, stops: transform.stops } : {};
 }
 
-/**
- * Take an exact answer. Its sentences follow later; until then the last sentences stay.
- * @param {any} answer @param {Ui} previous @returns {Partial<Ui>}
- */
+/** Take an exact answer. Its sentences follow later; until then the last sentences stay.
+ * @param {any} answer @param {Ui} previous @returns {Partial<Ui>} */
 function answerFields(answer, previous) {
   const { headline, lights, shares = null, closeness = null, deliveries = [] } = answer;
   /** @type {Partial<Ui>} */
@@ -339,8 +335,8 @@ export function progressUpdate({ task, done, total, unit }, ui) {
 const MIN_TIMED_SECONDS = 2;
 
 /** Extrapolate from the progress since the first report.
- * @param {import('./ui_state.js').Progress} progress
- * @param {import('./ui_state.js').Progress | null} previous @returns {import('./ui_state.js').Progress} */
+ * @param {Progress} progress
+ * @param {Progress | null} previous @returns {Progress} */
 function estimateTime(progress, previous) {
   const ms = performance.now();
   const isSameTask =
@@ -354,7 +350,7 @@ function estimateTime(progress, previous) {
   return { ...progress, since, remainingSeconds };
 }
 
-/** Return the places of the lights that can move, by name. @param {import("../engine/messages.js").Rig} rig
+/** Return the places of the lights that can move, by name. @param {Rig} rig
  * @param {Ui["lights"]} lights @returns {Record<string, number[]>} */
 export function movablePlaces(rig, lights) {
   return Object.fromEntries(

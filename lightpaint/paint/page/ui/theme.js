@@ -1,6 +1,6 @@
 /** The dark and the light theme: as the system or the notebook has it, or as chosen. */
 
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @import { UiStore } from './ui_state.js' */
 /** @typedef {"system" | "dark" | "light"} Theme */
 
 /** @type {Theme[]} */
@@ -20,11 +20,9 @@ function notebookTheme() {
   return classList.contains('light-theme') ? 'light' : null;
 }
 
-/**
- * Give an element the theme from now on, also when the system, the notebook or the choice changes.
+/** Give an element the theme from now on, also when the system, the notebook or the choice changes.
  * @param {HTMLElement} root of the painter @param {UiStore} store
- * @returns {() => void} what ends it
- */
+ * @returns {() => void} what ends it */
 export function followTheme(root, store) {
   const lightSystem = matchMedia('(prefers-color-scheme: light)');
   const update = () => {

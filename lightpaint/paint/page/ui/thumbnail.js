@@ -2,12 +2,10 @@
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Picture, Ui } from './ui_state.js' */
 
-/**
- * @param {{name: string, generation?: number, app: App}} props generation:
- *   undefined while there is no such picture
- */
+/** @param {{name: string, generation?: number, app: App}} props generation:
+ *   undefined while there is no such picture */
 export function Thumbnail({ name, generation, app }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const drawnName = useRef(/** @type {string | null} */ (null));
@@ -47,7 +45,7 @@ export function Thumbnail({ name, generation, app }) {
 }
 
 /** Return the style of a sheet of pictures of a view: their places are as high before they come.
- * @param {import("./ui_state.js").Ui} ui */
+ * @param {Ui} ui */
 export function sheetStyle({ views, view }) {
   const [height, width] = views[view]?.size ?? [9, 16];
   return { '--aspect': `${width} / ${height}` };
@@ -58,7 +56,7 @@ function clear(canvas) {
   canvas.getContext('2d')?.clearRect(0, 0, canvas.width, canvas.height);
 }
 
-/** @param {HTMLCanvasElement} canvas @param {import("./engine_interface.js").Picture} picture (h, w, 3) */
+/** @param {HTMLCanvasElement} canvas @param {Picture} picture (h, w, 3) */
 export function drawPicture(canvas, { data, shape: [height, width] }) {
   canvas.width = width;
   canvas.height = height;

@@ -1,7 +1,6 @@
 /** Tied lights: locking one of them, or switching it off, affects all. */
 
-/** @typedef {import("./ui_state.js").Constraints} Constraints */
-/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @import { Constraints, Ui } from './ui_state.js' */
 
 /** Return the names of all lights on a light's dimmer, if there are others. @param {Ui} ui
  * @param {number} light */

@@ -2,7 +2,7 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
-import { toHex } from './paint_colour.js';
+import { toHex } from '../../../viewer/drawing/colour.js';
 import { displayColour } from './colour_panel.js';
 import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
 import { signedText } from './format.js';
@@ -21,8 +21,7 @@ import {
 import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 /** Sizes are perceived as ratios. */
 const RATIO_CURVE = {
@@ -38,17 +37,9 @@ const FACTOR_CURVE = {
 
 const AREAS = [
   { value: 'spot', label: t('Spot'), tip: t('A soft spot where the drag begins') },
-  {
-    value: 'object',
-    label: t('Object'),
-    tip: t('The whole object under the pointer'),
-  },
+  { value: 'object', label: t('Object'), tip: t('The whole object under the pointer') },
 ];
-const SELECTED = {
-  value: 'selection',
-  label: t('Selection'),
-  tip: t('All that is selected'),
-};
+const SELECTED = { value: 'selection', label: t('Selection'), tip: t('All that is selected') };
 
 /** Return the areas that a drag may adjust. @param {Ui} ui */
 const areasOf = ({ state, selection }) => [
@@ -185,10 +176,7 @@ export function AdjustPanel({ ui, app }) {
   // By its name, since another view numbers its objects differently and may not show this one.
   const isMissing = object !== null && !objects.includes(object);
   const choices = [
-    {
-      value: WHOLE_PICTURE,
-      label: ui.selection.current ? t('Selection') : t('Whole picture'),
-    },
+    { value: WHOLE_PICTURE, label: ui.selection.current ? t('Selection') : t('Whole picture') },
     ...(isMissing ? [{ value: object, label: t('{object}: not in this view', { object }) }] : []),
     ...[...objects]
       .sort((a, b) => a.localeCompare(b))

@@ -1,21 +1,14 @@
 /** The tools, their hints, and changes of their settings. */
 
-import { toHex } from './paint_colour.js';
+import { toHex } from '../../../viewer/drawing/colour.js';
 import { exposureOf } from './display_state.js';
 import { t } from '../language/language.js';
 
-/** @typedef {import("./engine_interface.js").Tool} Tool */
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @import { Display, RGB, Tool, Ui, UiStore } from './ui_state.js' */
 
 /** @type {{tool: Tool, label: string, icon: string, tip: string}[]} */
 export const TOOLS = [
-  {
-    tool: 'brush',
-    label: t('Brush'),
-    icon: 'brush',
-    tip: t('Brush: paint light'),
-  },
+  { tool: 'brush', label: t('Brush'), icon: 'brush', tip: t('Brush: paint light') },
   {
     tool: 'eraser',
     label: t('Eraser'),
@@ -28,30 +21,15 @@ export const TOOLS = [
     icon: 'weight',
     tip: t('Importance: where the answer must match best'),
   },
-  {
-    tool: 'pick',
-    label: t('Picker'),
-    icon: 'pick',
-    tip: t('Picker: take paint from a picture'),
-  },
+  { tool: 'pick', label: t('Picker'), icon: 'pick', tip: t('Picker: take paint from a picture') },
   {
     tool: 'neutral',
     label: t('Neutral'),
     icon: 'neutral',
     tip: t('Neutral: press what should be white or grey, and the rest follows'),
   },
-  {
-    tool: 'fill',
-    label: t('Fill'),
-    icon: 'fill',
-    tip: t('Fill: paint a whole object'),
-  },
-  {
-    tool: 'line',
-    label: t('Line'),
-    icon: 'line',
-    tip: t('Line: paint a straight line'),
-  },
+  { tool: 'fill', label: t('Fill'), icon: 'fill', tip: t('Fill: paint a whole object') },
+  { tool: 'line', label: t('Line'), icon: 'line', tip: t('Line: paint a straight line') },
   {
     tool: 'adjust',
     label: t('Adjust'),
@@ -198,7 +176,7 @@ const isSame = (paint, other) =>
   toHex(paint.colour) === toHex(other.colour) && Math.abs(paint.stops - other.stops) < 0.01;
 
 /** The flow of the current tool: the fill has its own, independent of the brush.
- * @param {import("./ui_state.js").Ui} ui */
+ * @param {Ui} ui */
 export const flowOf = (ui) => (ui.tool === 'fill' ? ui.fillFlow : ui.flow);
 
 /** @param {UiStore} store @param {number} flow */
@@ -218,7 +196,7 @@ export function hardenBrush(store, sign) {
   store.set({ hardness: Math.min(1, Math.max(0, Math.round(hardness * 10) / 10)) });
 }
 
-/** @param {UiStore} store @param {Partial<import("./engine_interface.js").Display>} changes */
+/** @param {UiStore} store @param {Partial<Display>} changes */
 export function updateDisplay(store, changes) {
   store.set((ui) => ({ display: { ...ui.display, ...changes } }));
 }
@@ -243,6 +221,6 @@ const OVERLAYS = /** @type {const} */ ([
 ]);
 
 /** Return the overlays of the view: lux only where it shows measuring planes.
- * @param {import("./ui_state.js").Ui} ui */
+ * @param {Ui} ui */
 export const overlaysOf = ({ planes, view }) =>
   OVERLAYS.filter((overlay) => overlay !== 'lux' || planes?.cameras[view]);

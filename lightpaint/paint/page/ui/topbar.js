@@ -3,15 +3,13 @@
 import { html } from '../vendor/preact.js';
 import { Button, Checkbox, Choice, Select, Slider, TruncatedText } from './controls.js';
 import { signedText } from './format.js';
-import { OriginalButton } from './original_scene.js';
-import { PreviousButton } from './previous_answer.js';
+import { OriginalButton, PreviousButton } from './held_pictures.js';
 import { showPixels } from './shortcuts.js';
 import { togglePanels, updateDisplay } from './tools.js';
 import { t } from '../language/language.js';
 import { keyText, shortcutsOf } from './key_bindings.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 const LAYOUTS = [
   { value: 'side', label: t('Side by side'), icon: 'side' },

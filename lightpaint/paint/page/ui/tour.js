@@ -5,9 +5,7 @@ import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, useId } from './controls.js';
 import { keyText } from './key_bindings.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui, UiStore } from './ui_state.js' */
 /** A step: the part that it is about, where its bubble is, and what is unfolded for it.
  * @typedef {{part: string, side: "inside" | "right" | "left" | "above", title: string,
  *   text: (ui: Ui) => string, fold?: string}} Step */

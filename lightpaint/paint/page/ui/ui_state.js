@@ -1,37 +1,49 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
-import { INITIAL_CHOICES } from './answer_choices.js';
-import { INITIAL_CONSOLE } from './lamps/console_row.js';
-import { INITIAL_PLANES } from './planes/plane_state.js';
-import { INITIAL_IMAGES } from './images/image_state.js';
-import { INITIAL_LAMPS } from './lamps/lamp_state.js';
-import { INITIAL_RENDERS } from './exports/render_state.js';
-import { fromKelvin } from './paint_colour.js';
+import { fromKelvin } from '../../../viewer/drawing/colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
-import { INITIAL_REFERENCES } from './references/reference_state.js';
-import { INITIAL_SCOPES } from './scopes/scope_state.js';
-import { initialGradient } from './selection/gradient_settings.js';
-import { initialSelection } from './selection/selection_settings.js';
 
-/** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./engine_interface.js").Display} Display */
-/** @typedef {import("./engine_interface.js").Tool} Tool */
+/** @import { AnswerChoice, Closeness, ConsoleInfo, Layer, LightPlace, PlacePair, PlanesInfo, PlanesReading, ReferenceInfo, RenderInfo, Rig, WishDelivery } from '../engine/messages.js' */
+/** @import { Mode } from '../engine/selection/mask_operations.js' */
+/** @import { Corner } from '../engine/selection/polygon_mask.js' */
+/** @import { Summary } from '../engine/selection/selections.js' */
+/** @import { LightImage } from './images/light_images.js' */
+/** @import { TexelPaint } from './images/texel_arithmetic.js' */
+/** @import { TexelTool } from './images/texel_stroke.js' */
+/** @import { Probe } from './brush_cursor.js' */
+/** @import { Mix } from './look_comparison.js' */
+/** @import { ComparedAreas } from './references/reference_state.js' */
+/** @import { ScopeKind } from './scopes/scope_drawing.js' */
+/** @import { Shape, TypedKind } from './selection/selection_settings.js' */
+/** @import { Paint } from './tools.js' */
 
+// Types that the interface and its modules share.
+/** @typedef {import("../engine/picture_engine.js").PictureEngine} Engine */
+/** In CSS pixels of the engine's element. @typedef {ReturnType<Engine["panes"]>[number]} Pane */
+/** @typedef {Required<Omit<import("../engine/picture_slots.js").Display, "draftStep">>} DrawnDisplay */
+/** What is chosen to be shown: lux are drawn over the engine's pictures.
+ * @typedef {Omit<DrawnDisplay, "overlay"> & {overlay: DrawnDisplay["overlay"] | "lux"}} Display */
+/** @typedef {import("../engine/brush.js").Point} Point */
+/** @typedef {import("../engine/stroke.js").Tool} Tool */
+/** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
+/** @typedef {import("../../../viewer/drawing/lattice.js").Picture} Picture */
+/** @typedef {import("../engine/message_frames.js").Message} Message */
+/** @typedef {import("../engine/socket_host.js").Host} Host */
+/** @typedef {import("../engine/socket_host.js").HostEvents} HostEvents */
+/** @typedef {import("../engine/messages.js").Requests} Requests */
+/** @typedef {import("../engine/messages.js").RGB} RGB */
 /** @typedef {import("../engine/messages.js").LightInfo} Light */
 /** @typedef {import("../engine/messages.js").LightAnswer} LightAnswer */
 /** @typedef {import("../engine/messages.js").LookInfo} Look */
 /** @typedef {Record<string, any>} Constraints */
 /** @typedef {import("../engine/messages.js").Advice} Advice */
 /** A request that changes settings or constraints.
- * @typedef {{[K in "change_settings" | "constrain_lights" | "tie"]:
- *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["change_settings" | "constrain_lights" | "tie"]}
- *   Change */
+ * @template {"change_settings" | "constrain_lights" | "tie"} K
+ * @typedef {{kind: K, fields: Requests[K]}} ChangeOf */
+/** @typedef {ChangeOf<"change_settings"> | ChangeOf<"constrain_lights"> | ChangeOf<"tie">} Change */
 /** A preview of a change: its name and the known part of its effect.
  * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
- *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
- *   Preview */
-/** @typedef {import("../engine/messages.js").Closeness} Closeness */
-/** @typedef {import("../engine/messages.js").WishDelivery} WishDelivery */
+ *   before: Picture | null, after: Picture | null}} Preview */
 /** The effect of the next click: aim a light or hang a new one. edge: the place that casts the
  * shadow, once clicked.
  * @typedef {{light: number, mode: "aim" | "highlight" | "shadow", edge?: [number, number]}
@@ -44,139 +56,10 @@ import { initialSelection } from './selection/selection_settings.js';
  *   since?: {ms: number, done: number}, remainingSeconds?: number}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
-/**
- * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
- *   & import("./references/reference_state.js").ReferenceState
- *   & import("./scopes/scope_state.js").ScopeState
- *   & import("./answer_choices.js").ChoiceState
- *   & import("./lamps/console_row.js").ConsoleUi & import("./planes/plane_state.js").PlaneState
- *   & import("./images/image_state.js").ImageState & import("./exports/render_state.js").RenderState
- *   & BaseUi} Ui
- *
- * @typedef {object} BaseUi
- * @property {boolean} ready whether the session has sent what there is
- * @property {string} waitReason why there is nothing yet, if something went wrong
- * @property {boolean} isExporting files
- * @property {Progress | null} exportProgress how far the export is, if it takes long
- * @property {any} state as the session sent it last, of the view that is shown
- * @property {number} version how often the session had changed, as its last message says
- * @property {number} view that is shown
- * @property {{name: string, size: [number, number]}[]} views of the session
- * @property {(Closeness | null)[] | null} closeness how close each view is; null where nothing is painted
- * @property {WishDelivery[]} deliveries how much of each wish came, by the last exact answer
- * @property {number[][] | null} shares of each light, in each view
- * @property {Record<number, any>} verifications renders, by view
- * @property {Light[]} lights
- * @property {LightAnswer[]} lightAnswers the last exact answer
- * @property {RGB[]} weights the last answer
- * @property {string} headline
- * @property {Advice | null} advice what the headline advises
- * @property {Preview | null} preview of a change that is looked at before it is made
- * @property {number | null} deltaE
- * @property {number | null} deltaPresent the same of the current lighting: how much was asked for
- * @property {string[]} sentences
- * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
- * @property {boolean} isJudgementCurrent whether the statements on the answer are on the last one
- * @property {Record<string, Constraints>} constraints
- * @property {Record<string, Constraints>} earlier constraints of held lights from before they were held
- * @property {boolean} isStarted whether the solve starts from lamps that were set by hand
- * @property {string[]} kept names of lights that are held only since they were moved
- * @property {string[][]} ties
- * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
- * @property {string[]} addedLights names of lights that the scene does not have
- * @property {string} places a text, equal for equal places of all lights
- * @property {import("../engine/messages.js").Rig | null} rig where the lights hang, once it is known
- * @property {boolean} areLampsMarked whether lights are marked in the pictures
- * @property {number | null} lamp the marked light that was chosen, which has handles
- * @property {{light: number, place: Partial<import("../engine/messages.js").LightPlace>,
- *   aimPixel?: [number, number]} | null} drag where a light is that the pointer drags; at: the pixel that
- *   it points at
- * @property {Progress | null} placementProgress how far a search for places of the lights is
- * @property {boolean} isPlacementEnding whether the search ends with the best so far
- * @property {number} searchCount searches for places that have ended while the page was open
- * @property {Progress | null} samplingProgress how near the lights are to the precision sought
- * @property {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} trial
- *   places that a search tries now, by name of light
- * @property {{type: NewKind, surface: string, count: number}} newLight the light to add: where it hangs is
- *   "click", "anywhere", or the name of a rail, surface or shape
- * @property {boolean} isNewLightSought whether the fields of a new light are to be scrolled into view
- * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
- * @property {ClickAction | null} clickAction what the next click on a picture does
- * @property {Record<string, any>} settings
- * @property {Record<string, any>} effectiveSettings
- * @property {{undo: string[], redo: string[], count?: number}} history labels of steps, and their count
- * @property {boolean} isPreviousHeld whether the answer before the last step is asked for
- * @property {RGB[] | null} previousWeights that answer, while it is shown
- * @property {boolean} isOriginalHeld whether the original scene is shown in place of the answer
- * @property {Look[]} looks
- * @property {{look: number, version: number, steps: number} | null} lastLook last saved or loaded, with
- *   the version and the number of steps then
- * @property {Progress | null} basis
- * @property {Progress | null} verificationProgress
- * @property {{done: number, total: number, isFirst?: boolean} | null} loadProgress pictures of the lights;
- *   isFirst: some of the lights have none yet
- * @property {string | null} loadingLook name of the look that is being loaded
- * @property {{agrees: boolean, text: string, isOld?: boolean} | null} verification
- * @property {string[]} reasons
- * @property {boolean} isExplaining
- * @property {{files: string[], command: string, is_unpainted?: boolean,
- *   is_stopped?: boolean} | null} exportResult
- * @property {"wait" | "open" | "lost" | "stale"} connection
- * @property {boolean} isSilent whether an answer is long in coming
- * @property {{reason: string, text: string} | null} closure
- * @property {number} lostStrokes number of strokes that no session received
- * @property {Toast[]} toasts
- * @property {import("../engine/messages.js").Layer[]} layers of the painting, the lowest first
- * @property {number} layer id of the active one
- * @property {number | null} openLayer id of the one whose controls are unfolded
- * @property {number | null} maskLayer id of the layer whose mask is painted
- * @property {number} nextLayer id of the next new one
- * @property {Record<number, number>} layerRevisions numbers that grow when a layer's pixels change
- * @property {boolean} isPaintingEmpty whether nothing is on the layer that is always there
- * @property {number[]} selectedLayers ids of several layers for one action
- * @property {number | null} hoveredLayer id of the layer whose mask is shown
- * @property {File | null} layerFile that somebody imports, while it is asked where to
- * @property {string} layerNote what has happened to a layer by key, for screen readers
- * @property {Record<string, number>} resources
- * @property {boolean} hint whether somebody still needs instructions
- * @property {Tool} tool
- * @property {number} size
- * @property {number} hardness
- * @property {number} flow
- * @property {number} fillFlow the flow of Fill
- * @property {number} importance
- * @property {"light" | "colour"} paintMode
- * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts
- * @property {import("./selection/selection_settings.js").SelectionUi} selection
- * @property {import("./selection/gradient_settings.js").GradientUi} gradient
- * @property {RGB} colour linear, its largest channel at most 1
- * @property {number} stops brightness of the paint over `colour`
- * @property {import("./tools.js").Paint} second
- * @property {import("./tools.js").Paint[]} recent
- * @property {"white" | "hsv" | "rgb"} mixer
- * @property {{stops: number, mired: number} | null} dragAdjustment of a drag in progress
- * @property {{stops: number, mired: number, object: string | null}} typedAdjustment the adjustment in
- *   numbers: of an object or, for null, of the whole picture
- * @property {Display} display
- * @property {number[]} solo lights
- * @property {number[]} mute
- * @property {number | null} hoveredLight light whose own picture is shown
- * @property {import("./engine_interface.js").Probe | null} probe
- * @property {number | null} fit CSS pixels for each of the picture where all of it is seen
- * @property {import("./look_comparison.js").Mix | null} mix of looks that are compared
- * @property {Record<string, boolean>} open what is unfolded
- * @property {boolean} side whether the panels are there
- * @property {string} panelNote where a panel was moved to by key, for screen readers
- * @property {null | "settings"} panel what lies over the panels
- * @property {number | null} tour step of the tour that is shown
- * @property {string | null} tourFold what this step has unfolded and folds again
- * @property {null | "keys" | "export" | "render" | "move" | "looks" | "presets"} dialog
- * @property {string} search
- * @property {"scene" | "name" | "share" | "change"} sort
- * @property {number[]} openLights lights whose controls are open
- */
-
+/** @typedef {ReturnType<typeof initialState>} Ui */
 /** @typedef {import("./ui_store.js").Store<Ui>} UiStore */
+/** @typedef {import("./session_controller.js").SessionController} SessionController */
+/** What all parts of the interface use. @typedef {{store: UiStore, session: SessionController, engine: Engine}} App */
 
 /** @type {Display} */
 const DEFAULT_DISPLAY = {
@@ -201,129 +84,214 @@ const DEFAULT_DISPLAY = {
   master: 1,
 };
 
-/** @returns {Ui} */
+/** Return the state of a page that has just opened. */
 export function initialState() {
   return {
-    ready: false,
-    waitReason: '',
-    isExporting: false,
-    exportProgress: null,
-    state: null,
-    version: -1,
-    view: 0,
-    views: [],
-    closeness: null,
-    deliveries: [],
-    shares: null,
-    verifications: {},
-    lights: [],
-    lightAnswers: [],
-    weights: [],
+    ready: false, // whether the session has sent what there is
+    waitReason: '', // why there is nothing yet, if something went wrong
+    isExporting: false, // files
+    exportProgress: /** @type {Progress | null} */ (null), // how far the export is, if it takes long
+    state: /** @type {any} */ (null), // as the session sent it last, of the view that is shown
+    version: -1, // how often the session had changed, as its last message says
+    view: 0, // that is shown
+    views: /** @type {{name: string, size: [number, number]}[]} */ ([]), // of the session
+    // how close each view is; null where nothing is painted
+    closeness: /** @type {(Closeness | null)[] | null} */ (null),
+    deliveries: /** @type {WishDelivery[]} */ ([]), // how much of each wish came, by the last exact answer
+    shares: /** @type {number[][] | null} */ (null), // of each light, in each view
+    verifications: /** @type {Record<number, any>} */ ({}), // renders, by view
+    lights: /** @type {Light[]} */ ([]),
+    lightAnswers: /** @type {LightAnswer[]} */ ([]), // the last exact answer
+    weights: /** @type {RGB[]} */ ([]), // the last answer
     headline: '',
-    advice: null,
-    preview: null,
-    deltaE: null,
-    deltaPresent: null,
-    sentences: [],
-    isLive: false,
-    isJudgementCurrent: true,
-    constraints: {},
-    earlier: {},
-    kept: [],
-    isStarted: false,
-    ties: [],
-    poses: {},
-    addedLights: [],
-    places: '',
-    rig: null,
-    areLampsMarked: false,
-    lamp: null,
-    drag: null,
-    placementProgress: null,
-    isPlacementEnding: false,
-    searchCount: 0,
-    samplingProgress: null,
-    trial: null,
-    newLight: { type: 'spot', surface: 'click', count: 1 },
-    isNewLightSought: false,
-    ghosts: {},
-    clickAction: null,
-    settings: {},
-    effectiveSettings: {},
-    history: { undo: [], redo: [] },
-    isPreviousHeld: false,
-    previousWeights: null,
-    isOriginalHeld: false,
-    looks: [],
-    lastLook: null,
-    basis: null,
-    verificationProgress: null,
-    loadProgress: null,
-    loadingLook: null,
-    verification: null,
-    reasons: [],
+    advice: /** @type {Advice | null} */ (null), // what the headline advises
+    preview: /** @type {Preview | null} */ (null), // of a change that is looked at before it is made
+    deltaE: /** @type {number | null} */ (null),
+    // the same of the current lighting: how much was asked for
+    deltaPresent: /** @type {number | null} */ (null),
+    sentences: /** @type {string[]} */ ([]),
+    isLive: false, // the last answer is the quick one, of a stroke in progress
+    isJudgementCurrent: true, // whether the statements on the answer are on the last one
+    constraints: /** @type {Record<string, Constraints>} */ ({}),
+    // constraints of held lights from before they were held
+    earlier: /** @type {Record<string, Constraints>} */ ({}),
+    isStarted: false, // whether the solve starts from lamps that were set by hand
+    kept: /** @type {string[]} */ ([]), // names of lights that are held only since they were moved
+    ties: /** @type {string[][]} */ ([]),
+    poses: /** @type {Record<string, Record<string, any>>} */ ({}), // of lights that were moved, by name
+    addedLights: /** @type {string[]} */ ([]), // names of lights that the scene does not have
+    places: '', // a text, equal for equal places of all lights
+    // where the lights hang, once it is known
+    rig: /** @type {Rig | null} */ (null),
+    areLampsMarked: false, // whether lights are marked in the pictures
+    lamp: /** @type {number | null} */ (null), // the marked light that was chosen, which has handles
+    // where a light is that the pointer drags; aimPixel: that it points at
+    drag: /** @type {{light: number, place: Partial<LightPlace>, aimPixel?: [number, number]} | null} */ (null),
+    placementProgress: /** @type {Progress | null} */ (null), // how far a search for places of the lights is
+    isPlacementEnding: false, // whether the search ends with the best so far
+    searchCount: 0, // searches for places that have ended while the page was open
+    // how near the lights are to the precision sought
+    samplingProgress: /** @type {Progress | null} */ (null),
+    // places that a search tries now, by name of light
+    trial: /** @type {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} */ (null),
+    // the light to add: where it hangs is "click", "anywhere", or the name of a rail, surface or shape
+    newLight: /** @type {{type: NewKind, surface: string, count: number}} */ ({ type: 'spot', surface: 'click', count: 1 }),
+    isNewLightSought: false, // whether the fields of a new light are to be scrolled into view
+    // places of lights before a search has moved them, by name
+    ghosts: /** @type {Record<string, number[]>} */ ({}),
+    clickAction: /** @type {ClickAction | null} */ (null), // what the next click on a picture does
+    settings: /** @type {Record<string, any>} */ ({}),
+    effectiveSettings: /** @type {Record<string, any>} */ ({}),
+    // labels of steps, and their count
+    history: /** @type {{undo: string[], redo: string[], count?: number}} */ ({ undo: [], redo: [] }),
+    isPreviousHeld: false, // whether the answer before the last step is asked for
+    previousWeights: /** @type {RGB[] | null} */ (null), // that answer, while it is shown
+    isOriginalHeld: false, // whether the original scene is shown in place of the answer
+    looks: /** @type {Look[]} */ ([]),
+    // last saved or loaded, with the version and the number of steps then
+    lastLook: /** @type {{look: number, version: number, steps: number} | null} */ (null),
+    basis: /** @type {Progress | null} */ (null),
+    verificationProgress: /** @type {Progress | null} */ (null),
+    // pictures of the lights; isFirst: some of the lights have none yet
+    loadProgress: /** @type {{done: number, total: number, isFirst?: boolean} | null} */ (null),
+    loadingLook: /** @type {string | null} */ (null), // name of the look that is being loaded
+    verification: /** @type {{agrees: boolean, text: string, isOld?: boolean} | null} */ (null),
+    reasons: /** @type {string[]} */ ([]),
     isExplaining: false,
-    exportResult: null,
-    connection: 'wait',
-    isSilent: false,
-    closure: null,
-    lostStrokes: 0,
-    toasts: [],
-    layers: [],
-    layer: 0,
-    openLayer: null,
-    maskLayer: null,
-    nextLayer: 1,
-    layerRevisions: {},
-    isPaintingEmpty: true,
-    selectedLayers: [],
-    hoveredLayer: null,
-    layerFile: null,
-    layerNote: '',
-    resources: {},
-    hint: false,
-    tool: 'brush',
+    exportResult: /** @type {{files: string[], command: string, is_unpainted?: boolean, is_stopped?: boolean} | null} */ (null),
+    connection: /** @type {"wait" | "open" | "lost" | "stale"} */ ('wait'),
+    isSilent: false, // whether an answer is long in coming
+    closure: /** @type {{reason: string, text: string} | null} */ (null),
+    lostStrokes: 0, // number of strokes that no session received
+    toasts: /** @type {Toast[]} */ ([]),
+    layers: /** @type {Layer[]} */ ([]), // of the painting, the lowest first
+    layer: 0, // id of the active one
+    openLayer: /** @type {number | null} */ (null), // id of the one whose controls are unfolded
+    maskLayer: /** @type {number | null} */ (null), // id of the layer whose mask is painted
+    nextLayer: 1, // id of the next new one
+    // numbers that grow when a layer's pixels change
+    layerRevisions: /** @type {Record<number, number>} */ ({}),
+    isPaintingEmpty: true, // whether nothing is on the layer that is always there
+    selectedLayers: /** @type {number[]} */ ([]), // ids of several layers for one action
+    hoveredLayer: /** @type {number | null} */ (null), // id of the layer whose mask is shown
+    layerFile: /** @type {File | null} */ (null), // that somebody imports, while it is asked where to
+    layerNote: '', // what has happened to a layer by key, for screen readers
+    resources: /** @type {Record<string, number>} */ ({}),
+    hint: false, // whether somebody still needs instructions
+    tool: /** @type {Tool} */ ('brush'),
     size: 60,
     hardness: 0.2,
     flow: 0.5,
-    fillFlow: 1,
+    fillFlow: 1, // the flow of Fill
     importance: 4,
-    paintMode: 'light',
-    adjustedArea: 'spot',
-    selection: initialSelection(),
-    gradient: initialGradient(),
-    colour: fromKelvin(3200),
-    stops: 0,
-    second: { colour: fromKelvin(12000), stops: 0 },
-    recent: [],
-    mixer: 'white',
-    dragAdjustment: null,
-    typedAdjustment: { stops: 0.5, mired: 0, object: null },
-    display: DEFAULT_DISPLAY,
-    solo: [],
-    mute: [],
-    hoveredLight: null,
-    probe: null,
-    fit: null,
-    mix: null,
-    open: { colour: true, lights: true, plan: true, planes: true, truth: false },
-    side: true,
-    panelNote: '',
-    panel: null,
-    tour: null,
-    tourFold: null,
-    dialog: null,
+    paintMode: /** @type {"light" | "colour"} */ ('light'),
+    adjustedArea: /** @type {"spot" | "object" | "selection"} */ ('spot'), // what a drag adjusts
+    selection: {
+      current: /** @type {Summary | null} */ (null), // null while everything can be painted
+      shape: /** @type {Shape} */ ('rectangle'),
+      mode: /** @type {Mode} */ ('replace'), // how a new part joins what is selected
+      feather: 0, // width of a new part's soft edge, in pixels
+      tolerance: 12, // of a selection by colour, in ΔE
+      show: /** @type {"ants" | "tint"} */ ('ants'),
+      // a shape that is being drawn
+      draft: /** @type {{shape: Shape, corners: Corner[], mode: Mode} | null} */ (null),
+      kind: /** @type {TypedKind} */ ('rectangle'), // of the panel
+      box: /** @type {{x: number, y: number, width: number, height: number}} */ ({ x: 0, y: 0, width: 100, height: 100 }),
+      object: '', // name of that in the panel, "" for none
+      light: '',
+      picture: /** @type {"painting" | "solution"} */ ('painting'), // whose brightness counts
+      brightness: /** @type {[low: number, high: number]} */ ([60, 100]),
+      pixels: 8, // by which the selection grows, shrinks or fades
+      // what a drag adjusted before something was selected
+      areaBefore: /** @type {"spot" | "object" | "selection"} */ ('spot'),
+    },
+    gradient: {
+      shape: /** @type {"linear" | "radial"} */ ('linear'),
+      isAdjusting: false, // whether it makes brighter and warmer, instead of painting
+      hasEnd: false, // whether it leads to the second colour, instead of fading out
+      stops: 1,
+      mired: 0,
+    },
+    colour: /** @type {RGB} */ (fromKelvin(3200)), // linear, its largest channel at most 1
+    stops: 0, // brightness of the paint over `colour`
+    second: /** @type {Paint} */ ({ colour: fromKelvin(12000), stops: 0 }),
+    recent: /** @type {Paint[]} */ ([]),
+    mixer: /** @type {"white" | "hsv" | "rgb"} */ ('white'),
+    dragAdjustment: /** @type {{stops: number, mired: number} | null} */ (null), // of a drag in progress
+    // the adjustment in numbers: of an object or, for null, of the whole picture
+    typedAdjustment: /** @type {{stops: number, mired: number, object: string | null}} */ ({ stops: 0.5, mired: 0, object: null }),
+    display: /** @type {Display} */ (DEFAULT_DISPLAY),
+    solo: /** @type {number[]} */ ([]), // lights
+    mute: /** @type {number[]} */ ([]),
+    hoveredLight: /** @type {number | null} */ (null), // light whose own picture is shown
+    probe: /** @type {Probe | null} */ (null),
+    fit: /** @type {number | null} */ (null), // CSS pixels for each of the picture where all of it is seen
+    mix: /** @type {Mix | null} */ (null), // of looks that are compared
+    // what is unfolded
+    open: /** @type {Record<string, boolean>} */ ({ colour: true, lights: true, plan: true, planes: true, truth: false }),
+    side: true, // whether the panels are there
+    panelNote: '', // where a panel was moved to by key, for screen readers
+    panel: /** @type {null | "settings"} */ (null), // what lies over the panels
+    tour: /** @type {number | null} */ (null), // step of the tour that is shown
+    tourFold: /** @type {string | null} */ (null), // what this step has unfolded and folds again
+    dialog: /** @type {null | "keys" | "export" | "render" | "move" | "looks" | "presets"} */ (null),
     search: '',
-    sort: 'scene',
-    openLights: [],
-    ...INITIAL_LAMPS,
-    ...INITIAL_IMAGES,
+    sort: /** @type {"scene" | "name" | "share" | "change"} */ ('scene'),
+    openLights: /** @type {number[]} */ ([]), // lights whose controls are open
+
+    // Many lamps.
+    selectedLights: /** @type {number[]} */ ([]), // lights that one action changes
+    selectionAnchor: /** @type {number | null} */ (null), // the light from which Shift selects a range
+    isLassoing: false, // whether a drag over the pictures selects marked lights
+    gelCodes: /** @type {Record<string, string>} */ ({}), // codes of the filters put on lights here, by name
+    lampMixer: /** @type {"white" | "hsv" | "rgb" | "gel"} */ ('white'), // how the colour of lamps is set
+    master: 1, // factor of all lights but fixed ones
+
+    // Lights that are images.
+    images: /** @type {LightImage[]} */ ([]),
+    texelTool: /** @type {TexelTool} */ ('paint'),
+    texelColour: /** @type {RGB} */ (fromKelvin(6500)), // of the paint, its largest channel 1
+    texelStops: 0, // brightness of the paint, from the mean of the image in the scene
+    texelMixer: /** @type {"white" | "hsv" | "rgb"} */ ('white'), // how that colour is set
+    // that a gradient becomes
+    secondTexelPaint: /** @type {TexelPaint} */ ({ colour: fromKelvin(3200), stops: 1 }),
+    sunDiameter: 4, // in degrees
+    // stops at which maps stay shown, by name of the image
+    mapExposures: /** @type {Record<string, number>} */ ({}),
+
+    // Reference pictures.
+    references: /** @type {ReferenceInfo[]} */ ([]), // the oldest first
+    isReferenceOpen: false, // whether their pane is shown
+    reference: /** @type {number | null} */ (null), // id of the one that is shown; null for the last one
+    isReferenceComing: false, // whether a file is being read
+    comparedAreas: /** @type {ComparedAreas} */ ('regions'),
+    matchesBrightness: false,
+    // of all references: `owner` is the id of one
+    placePairs: /** @type {(PlacePair & {owner: number, view: number})[]} */ ([]),
+
+    // Measuring planes.
+    // null until they are measured
+    planes: /** @type {PlanesInfo | null} */ (null),
+    // what the answer gives there
+    planesReading: /** @type {PlanesReading | null} */ (null),
+    planesProgress: /** @type {Progress | null} */ (null), // how far a measurement is
+    planeCase: /** @type {string | null} */ (null), // the case that the pictures show; null for the first
+    hiddenPlanes: /** @type {string[]} */ ([]), // names of planes that are not drawn in the pictures
+
+    // Scopes.
+    scopeKind: /** @type {ScopeKind} */ ('waveform'),
+    scopePicture: /** @type {"painting" | "solution" | "present"} */ ('solution'), // whose codes it shows
+
+    // Answers with other light colours.
+    choices: /** @type {readonly AnswerChoice[]} */ ([]),
+    choicesVersion: -1, // of the session, of which they are
+
+    // A console.
+    console: /** @type {ConsoleInfo | null} */ (null), // null without one
+
+    // Final renders.
+    renders: /** @type {RenderInfo[]} */ ([]), // the oldest first
+    renderProgress: /** @type {Progress | null} */ (null), // of the one that is rendered now
     ...DEFAULT_PREFERENCES,
-    ...INITIAL_REFERENCES,
-    ...INITIAL_CHOICES,
-    ...INITIAL_CONSOLE,
-    ...INITIAL_PLANES,
-    ...INITIAL_SCOPES,
-    ...INITIAL_RENDERS,
   };
 }

@@ -3,9 +3,12 @@
 /** Milliseconds until listeners are notified of a change that need not be shown at once. */
 const MAX_DELAY_MS = 100;
 
-/**
- * @template {object} T
- */
+/** Return a list with an entry or, where it has it, without. @template T @param {readonly T[]} list
+ * @param {T} entry @returns {T[]} */
+export const toggled = (list, entry) =>
+  list.includes(entry) ? list.filter((other) => other !== entry) : [...list, entry];
+
+/** @template {object} T */
 export class Store {
   /** @param {T} value */
   constructor(value) {
@@ -20,11 +23,9 @@ export class Store {
     this.timer = undefined;
   }
 
-  /**
-   * Change part of the state. `value` changes at once; listeners are notified once, before the next
+  /** Change part of the state. `value` changes at once; listeners are notified once, before the next
    * frame.
-   * @param {Partial<T> | ((value: T) => Partial<T>)} changes
-   */
+   * @param {Partial<T> | ((value: T) => Partial<T>)} changes */
   set(changes) {
     this.change(changes);
     if (this.isScheduled) return;
@@ -74,10 +75,8 @@ export class Store {
     for (const listener of this.listeners) listener();
   }
 
-  /**
-   * @param {() => void} listener
-   * @returns {() => void} what ends it
-   */
+  /** @param {() => void} listener
+   * @returns {() => void} what ends it */
   listen(listener) {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);

@@ -8,8 +8,7 @@ import { Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").App} App */
+/** @import { App, Ui } from './ui_state.js' */
 
 /** Switch to another view. @param {App} app @param {number} view */
 export function showView({ store, engine }, view) {

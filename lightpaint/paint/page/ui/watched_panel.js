@@ -2,22 +2,20 @@
 
 import { Component, html } from '../vendor/preact.js';
 
-/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @import { Ui } from './ui_state.js' */
 /** @typedef {{ui: Ui} & Record<string, any>} Props */
 
 /** State on which panels depend through the engine, which has pictures and tables of colours.
  * @type {(keyof Ui)[]} */
 const ENGINE_STATE = ['display', 'loadProgress', 'ready', 'state'];
 
-/**
- * Return a panel that renders again only if its properties change, or a part of the state that it
+/** Return a panel that renders again only if its properties change, or a part of the state that it
  * or its children have read. A dragged light changes two parts of the state at every move of the
  * pointer, and few panels show these.
  *
  * @template {(props: any) => any} P
  * @param {P} Panel with the whole state in `ui`
- * @returns {P}
- */
+ * @returns {P} */
 export function watched(Panel) {
   class WatchedPanel extends Component {
     /** @param {Props} props */
@@ -50,6 +48,13 @@ export function watched(Panel) {
   }
   return /** @type {any} */ (WatchedPanel);
 }
+
+/** Return panels as `watched`, by their names. @template {Record<string, (props: any) => any>} P
+ * @param {P} panels @returns {P} */
+export const watchedPanels = (panels) =>
+  /** @type {any} */ (
+    Object.fromEntries(Object.entries(panels).map(([name, Panel]) => [name, watched(Panel)]))
+  );
 
 /** @param {Ui} ui @param {PropertyKey} part */
 const valueOf = (ui, part) => ui[/** @type {keyof Ui} */ (part)];

@@ -5,15 +5,15 @@
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").Gradient} Gradient */
-/** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
-/** @typedef {import("./layer_pixels.js").Tile} Tile */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { Gradient, Layer, RGB } from '../messages.js' */
+/** @import { ShownLayer } from './layer_composition.js' */
+/** @import { Tile } from './layer_pixels.js' */
 
 /** The gradient that a drag makes. isAdjusting: whether it adjusts by `gain` and `tint`, instead of
  * painting. hasEnd: whether it leads to another colour, instead of fading out.
  * @typedef {{shape: Gradient["shape"], isAdjusting: boolean, hasEnd: boolean, gain: number,
- *   tint: import("../message_frames.js").RGB, endRgb: import("../message_frames.js").RGB}} GradientSettings */
+ *   tint: RGB, endRgb: RGB}} GradientSettings */
 
 const round = Math.fround;
 
@@ -22,7 +22,7 @@ const MIN_GRADIENT = 1e-6;
 
 /** Return the properties of a gradient's layer that begins at a place.
  * @param {import("../stroke.js").ToolSettings} tool @param {{x: number, y: number}} place
- * @returns {Partial<import("../messages.js").Layer>} */
+ * @returns {Partial<Layer>} */
 export function gradientLayer({ gradient, rgb, paintMode }, { x, y }) {
   const { shape = 'linear', isAdjusting = false, hasEnd = false, endRgb } = gradient ?? {};
   const { gain = 1, tint = [1, 1, 1] } = gradient ?? {};

@@ -2,11 +2,11 @@
 import { PaintCanvas } from '../paint_canvas.js';
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("../paint_canvas.js").Tile} Tile */
-/** @typedef {import("../stroke_effects.js").Effect} Effect */
-/** @typedef {import("./layer_pixels.js").LayerPixels} LayerPixels */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { Layer } from '../messages.js' */
+/** @import { Tile } from '../paint_canvas.js' */
+/** @import { Effect } from '../stroke_effects.js' */
+/** @import { LayerPixels } from './layer_pixels.js' */
 
 /** Coverage below which a pixel is uncovered. */
 const MIN_COVERAGE = 1e-3;

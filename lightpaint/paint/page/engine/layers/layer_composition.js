@@ -4,8 +4,8 @@
  * Each operation is rounded to float32, as NumPy does, so that the page draws the session's bits.
  */
 
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("./layer_pixels.js").Tile} Tile */
+/** @import { Layer } from '../messages.js' */
+/** @import { Tile } from './layer_pixels.js' */
 /** A visible layer, with the strength and importance of its group included, and its accent.
  * @typedef {Layer & {accent: number}} ShownLayer */
 /** Light (n, 3) and importance (n) of some pixels, changed in place.

@@ -2,8 +2,8 @@
 
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
+/** @import { Layer } from '../messages.js' */
+/** @import { ShownLayer } from './layer_composition.js' */
 
 /** Id of the painting that is always there. */
 export const PAINTING_ID = 0;

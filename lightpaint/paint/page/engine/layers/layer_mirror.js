@@ -7,12 +7,9 @@ import { changedLayers, PAINTING, PAINTING_ID, plainLayer, shownLayers, withLaye
 import { LayerPicture } from './layer_picture.js';
 import { LayerPixels, splitPixels } from './layer_pixels.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("../messages.js").LayerInfo} LayerInfo */
-/** @typedef {import("../messages.js").LayerList} LayerList */
-/** @typedef {import("../messages.js").ChangeLayers} ChangeLayers */
-/** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { ChangeLayers, Layer, LayerInfo, LayerList } from '../messages.js' */
+/** @import { PaintCanvas } from '../paint_canvas.js' */
 
 /** Concurrent fetches. */
 const MAX_FETCHES = 4;

@@ -2,7 +2,7 @@
 import { luminance } from '../../../../viewer/drawing/colour.js';
 import { plural, t } from '../../language/language.js';
 
-/** @typedef {import("../messages.js").Layer} Layer */
+/** @import { Layer } from '../messages.js' */
 
 /** Smallest change that a name mentions: in stops, and of red over blue in stops. */
 const [LEAST_STOPS, LEAST_WARMTH] = [0.05, 0.02];

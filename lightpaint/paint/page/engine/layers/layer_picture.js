@@ -1,18 +1,17 @@
 /** The painting as its layers make it: composed tile by tile, where something has changed. */
+
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
 import { effectOf, gradientTile } from './gradient.js';
 import { applyLayer } from './layer_composition.js';
 import { isPlain, PAINTING_ID } from './layer_list.js';
 import { enclosing, tileKeys, tileRegion } from './layer_pixels.js';
-import { LowerLayers } from './lower_layers.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
-/** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
-/** @typedef {import("./layer_composition.js").Composed} Composed */
-/** @typedef {import("./layer_pixels.js").LayerPixels} LayerPixels */
-/** @typedef {import("./layer_pixels.js").Tile} Tile */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { Layer, RGB } from '../messages.js' */
+/** @import { PaintCanvas } from '../paint_canvas.js' */
+/** @import { Composed, ShownLayer } from './layer_composition.js' */
+/** @import { LayerPixels, Tile } from './layer_pixels.js' */
+
 /** The composition of the lowest layers, and what it depends on.
  * @typedef {{image: Float32Array, importance: Float32Array, count: number, state: string}} Base */
 /** How many of the lowest layers are in a captured composition, or are kept tile by tile.
@@ -110,7 +109,7 @@ export class LayerPicture {
 
   /** Return colour and coverage of a layer at a pixel; a mask has no colour. @param {number} id
    * @param {number} x @param {number} y
-   * @returns {{colour: import("../message_frames.js").RGB | null, coverage: number}} */
+   * @returns {{colour: RGB | null, coverage: number}} */
   pixelAt(id, x, y) {
     const { painting, pixels, size } = this;
     const p = y * size[1] + x;
@@ -244,3 +243,28 @@ export class LayerPicture {
 
 /** @param {Region} region */
 const pixelCount = ([top, bottom, left, right]) => (bottom - top) * (right - left);
+
+class LowerLayers {
+  constructor() {
+    /** What the tiles depend on. */
+    this.state = '';
+    /** @type {Map<number, Composed>} */
+    this.tiles = new Map();
+  }
+
+  /** Return a copy of a tile, which is composed if it is not known for this state.
+   * @param {string} state @param {number} key @param {() => Composed} compose
+   * @returns {Composed} */
+  tile(state, key, compose) {
+    if (state !== this.state) this.tiles.clear();
+    this.state = state;
+    const { light, counts } = this.tiles.get(key) ?? this.keep(key, compose());
+    return { light: light.slice(), counts: counts.slice() };
+  }
+
+  /** @param {number} key @param {Composed} tile */
+  keep(key, tile) {
+    this.tiles.set(key, tile);
+    return tile;
+  }
+}

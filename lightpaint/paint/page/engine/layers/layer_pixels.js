@@ -3,7 +3,7 @@
  * paint/layers/layer_pixels.py.
  */
 
-/** @typedef {import("../message_frames.js").Region} Region */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
 
 /** Side of a tile, in pixels. */
 export const TILE_SIDE = 64;

@@ -18,13 +18,14 @@ import { LayerCanvas } from './layer_canvas.js';
 import { TILE_SIDE } from './layer_pixels.js';
 import { LABELS } from '../stroke.js';
 
-/** @typedef {import("../brush.js").Point} Point */
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").Layer} Layer */
-/** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
-/** @typedef {import("../stroke.js").Tool} Tool */
-/** @typedef {import("../stroke.js").ToolSettings} ToolSettings */
-/** @typedef {import("./layer_mirror.js").LayerMirror} LayerMirror */
+/** @import { Point } from '../brush.js' */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { Layer } from '../messages.js' */
+/** @import { PaintCanvas } from '../paint_canvas.js' */
+/** @import { Selection } from '../selection/selection_mirror.js' */
+/** @import { Tool, ToolSettings } from '../stroke.js' */
+/** @import { LayerMirror } from './layer_mirror.js' */
+/** @import { LayerPicture } from './layer_picture.js' */
 
 /** Tiles that are looked at to say what a layer does. */
 const LOOKED_AT = 12;
@@ -52,7 +53,7 @@ export class LayerStrokes {
     this.ids = new Set();
     /** The canvas of the last stroke on a layer, for the next one. @type {LayerCanvas | null} */
     this.lastCanvas = null;
-    /** What strokes keep to; null for everything. @type {import("../paint_canvas.js").Selection | null} */
+    /** What strokes keep to; null for everything. @type {Selection | null} */
     this.selection = null;
   }
 
@@ -131,7 +132,7 @@ export class LayerStrokes {
   canvasOf(layer) {
     const pixels = this.mirror.pixelsOf(layer);
     const { lastCanvas: last } = this;
-    const { painting, size } = /** @type {import("./layer_picture.js").LayerPicture} */ (
+    const { painting, size } = /** @type {LayerPicture} */ (
       this.mirror.picture
     );
     if (last && last.layer.id === layer.id && last.pixels === pixels) last.layer = layer;
@@ -149,7 +150,7 @@ export class LayerStrokes {
     if (tool === 'gradient') return this.layerNew('gradient', gradientLayer(settings, place));
     const masked = this.maskId === null ? undefined : mirror.layer(this.maskId);
     if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
-    const { painting } = /** @type {import("./layer_picture.js").LayerPicture} */ (mirror.picture);
+    const { painting } = /** @type {LayerPicture} */ (mirror.picture);
     const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
     const isSelection = adjustedArea === 'selection' && this.selection !== null;
     if (tool === 'adjust') {
@@ -322,10 +323,7 @@ export class LayerStrokes {
   effectOf({ id }) {
     const { picture } = this.mirror;
     const all = [...(picture?.pixels.get(id)?.tiles ?? [])];
-    const [before, after] = [
-      [0, 0, 0],
-      [0, 0, 0],
-    ];
+    const [before, after] = [[0, 0, 0], [0, 0, 0]];
     const known = picture?.knownBelow([id]);
     const step = Math.max(1, Math.floor(all.length / LOOKED_AT));
     for (let k = 0; picture && k < all.length; k += step) {

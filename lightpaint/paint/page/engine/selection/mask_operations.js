@@ -1,8 +1,8 @@
 /** Operations on masks, (h, w) bytes: together, inverted, softer, larger, smaller. */
 import { FULL } from './polygon_mask.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("./polygon_mask.js").Size} Size */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { Size } from './polygon_mask.js' */
 /** How a new part joins what is selected.
  * @typedef {'replace' | 'add' | 'subtract' | 'intersect'} Mode */
 

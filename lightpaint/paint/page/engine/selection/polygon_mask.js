@@ -16,12 +16,7 @@ const [SIDES_PER_PIXEL, MIN_SIDES] = [6, 64];
  * @returns {Corner[]} */
 export function rectangle([ax, ay], [bx, by]) {
   const [x0, x1, y0, y1] = [Math.min(ax, bx), Math.max(ax, bx), Math.min(ay, by), Math.max(ay, by)];
-  return [
-    [x0, y0],
-    [x1, y0],
-    [x1, y1],
-    [x0, y1],
-  ];
+  return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
 }
 
 /** Return the corners of an ellipse that touches the sides of a rectangle. @param {Corner} a

@@ -4,9 +4,9 @@
  */
 import { boundsOf, cropped } from './mask_operations.js';
 
-/** @typedef {import("../message_frames.js").Region} Region */
-/** @typedef {import("../messages.js").SelectionInfo} SelectionInfo */
-/** @typedef {import("./polygon_mask.js").Size} Size */
+/** @import { Region } from '../../../../viewer/drawing/view.js' */
+/** @import { SelectionInfo } from '../messages.js' */
+/** @import { Size } from './polygon_mask.js' */
 /** What strokes keep to. mask: (h, w), the share of each pixel in 255ths. bounds: of what is above 0.
  * @typedef {{mask: Uint8Array, bounds: Region}} Selection */
 

@@ -9,23 +9,22 @@ import { SelectionMirror } from './selection_mirror.js';
 import { brightnessMask, colourMask, lightMask, objectMask } from './shown_masks.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../../../../viewer/drawing/view.js").Kind} Kind */
-/** @typedef {import("./mask_operations.js").Mode} Mode */
-/** @typedef {import("./polygon_mask.js").Corner} Corner */
-/** @typedef {import("./selection_mirror.js").Selection} Selection */
+/** @import { Kind } from '../../../../viewer/drawing/view.js' */
+/** @import { Mode } from './mask_operations.js' */
+/** @import { Corner } from './polygon_mask.js' */
+/** @import { Selection } from './selection_mirror.js' */
+/** @import { Region } from '../messages.js' */
 
-/**
- * A part to select. Places are in pixels of the picture. `picture`: whose colours count, as they are
+/** A part to select. Places are in pixels of the picture. `picture`: whose colours count, as they are
  * shown.
  * @typedef {{kind: 'rectangle' | 'ellipse', corners: [Corner, Corner]}
  *   | {kind: 'lasso', corners: Corner[]} | {kind: 'object', object: number}
  *   | {kind: 'light', light: number} | {kind: 'all'}
  *   | {kind: 'colour', picture: Kind, x: number, y: number, tolerance: number}
- *   | {kind: 'brightness', picture: Kind, low: number, high: number}} Part
- */
+ *   | {kind: 'brightness', picture: Kind, low: number, high: number}} Part */
 /** About what is selected. revision: grows with every change. share: of the picture. isFaint: whether
  * no pixel is half selected.
- * @typedef {{revision: number, bounds: import("../message_frames.js").Region, share: number,
+ * @typedef {{revision: number, bounds: Region, share: number,
  *   isFaint: boolean}} Summary */
 /** `pixels`: negative to shrink.
  * @typedef {{kind: 'none'} | {kind: 'invert'} | {kind: 'feather' | 'grow', pixels: number}} Change */

@@ -1,18 +1,17 @@
 /** The dialog for final renders: at any size, in the background, with the files that they became. */
 
 import { html, useState } from '../../vendor/preact.js';
-import { Button, Checkbox, Dialog, NumberField } from '../controls.js';
+import { Button, Checkbox, Dialog, NumberField, ProgressBar } from '../controls.js';
 import { percentText, progressText, relativePath } from '../format.js';
-import { ProgressBar } from '../progress_bar.js';
 import { Thumbnail } from '../thumbnail.js';
-import { ExportKind } from './export_kind.js';
-import { ExportName, suggestedName } from './export_name.js';
+import { ExportName, suggestedName, ExportKind, saveFile } from './export_fields.js';
 import { runningRender } from './render_state.js';
+import { toggled } from '../ui_store.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./render_state.js").Render} Render */
+/** @import { App, Ui } from '../ui_state.js' */
+/** @import { RenderInfo as Render } from '../../engine/messages.js' */
+
 /** @typedef {import("../../engine/messages.js").Requests["render_final"]} Request */
 
 /** Widths that are one press away, in pixels. */
@@ -69,8 +68,6 @@ function RenderSettings({ ui, app, disabled }) {
   };
   const [rows, columns] = /** @type {[number, number]} */ (ui.state?.size ?? [9, 16]);
   const height = Math.max(1, Math.round((width * rows) / columns));
-  const toggle = (/** @type {"exr" | "png"} */ format, /** @type {boolean} */ isOn) =>
-    set({ formats: isOn ? [...formats, format] : formats.filter((other) => other !== format) });
   const begin = () =>
     app.session.send('render_final', { name: name.trim(), width, spp, formats, view: ui.view });
   const folder = ui.state?.folder ?? '';
@@ -89,7 +86,7 @@ function RenderSettings({ ui, app, disabled }) {
     ${FORMATS.map(
       ({ format, label, description }) => html`<div class="export-row" key=${format}>
         <${Checkbox} label=${label} checked=${formats.includes(format)} disabled=${disabled}
-          change=${(/** @type {boolean} */ isOn) => toggle(format, isOn)} />
+          change=${() => set({ formats: toggled(formats, format) })} />
         <span class="faint">${description}</span></div>`,
     )}
     ${ui.views.length > 1 && html`<p>${t('Of the view that is shown, {view}.', { view: ui.views[ui.view].name })}</p>`}
@@ -160,11 +157,7 @@ function RenderStatus({ render, ui, app }) {
 async function download({ session }, name, fileName) {
   try {
     const { data } = await session.host.fetch(name);
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(new Blob([/** @type {any} */ (data)]));
-    link.download = fileName;
-    link.click();
-    URL.revokeObjectURL(link.href);
+    saveFile(new Blob([/** @type {any} */ (data)]), fileName);
   } catch (error) {
     session.toast(error instanceof Error ? error.message : String(error), 'warn');
   }

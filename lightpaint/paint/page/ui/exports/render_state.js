@@ -3,17 +3,9 @@
 import { relativePath } from '../format.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../../engine/messages.js").RenderInfo} Render */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-
-/**
- * @typedef {object} RenderState
- * @property {Render[]} renders the oldest first
- * @property {import("../ui_state.js").Progress | null} renderProgress of the one that is rendered now
- */
-
-/** @type {RenderState} */
-export const INITIAL_RENDERS = { renders: [], renderProgress: null };
+/** @import { RenderInfo as Render } from '../../engine/messages.js' */
+/** @import { Ui } from '../ui_state.js' */
+/** @typedef {Pick<Ui, "renders" | "renderProgress">} RenderState */
 
 /** Return the render that the renderer works on, or will next. @param {{renders: Render[]}} ui */
 export const runningRender = ({ renders }) =>

@@ -2,7 +2,7 @@
 
 import { signedText } from '../format.js';
 import { presentLevel } from '../level_field.js';
-import { luminance } from '../paint_colour.js';
+import { luminance } from '../../../../viewer/drawing/colour.js';
 import { findTie } from '../tied_lights.js';
 import { adjustableLights, isHeld } from '../lamps/many_lights.js';
 import { scaled } from '../lamps/lamp_colours.js';
@@ -10,13 +10,11 @@ import { lightsText } from '../lamps/light_selection.js';
 import { t } from '../../language/language.js';
 import { meanOf, wholeLight } from './light_images.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Constraints} Constraints */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @import { Constraints, RGB, SessionController, Ui } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
 
 export class ImageActions {
-  /** @param {import("../session_controller.js").SessionController} session */
+  /** @param {SessionController} session */
   constructor(session) {
     this.session = session;
     /** The answer when a slider began to move, so that the image survives being off.

@@ -3,8 +3,8 @@
 import { encode } from '../../../../viewer/drawing/colour.js';
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @import { RGB } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
 
 /** Draw an image on a canvas; texels that are not lights stay transparent.
  * @param {HTMLCanvasElement} canvas @param {LightImage} image @param {RGB[]} weights

@@ -1,10 +1,12 @@
 /** Lights that are images: their texels, their mean, and how they are exposed. */
 
-import { luminance } from '../paint_colour.js';
+import { luminance } from '../../../../viewer/drawing/colour.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Light} Light */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @import { Light, RGB, Ui } from '../ui_state.js' */
+/** @import { ImageInfo } from '../../engine/messages.js' */
+
+/** A light that is an image. lights: indices of its texels, each once, row by row.
+ * @typedef {ImageInfo & {lights: number[]}} LightImage */
 
 /** Part of the texels that a map may show too bright to tell. */
 const CLIPPED_SHARE = 0.02;
@@ -12,7 +14,7 @@ const CLIPPED_SHARE = 0.02;
 /** @type {WeakMap<LightImage[], Map<number, LightImage>>} */
 const owners = new WeakMap();
 
-/** Return images with the list of their lights; in a symmetric one two texels are one light. @param {import("../../engine/messages.js").ImageInfo[]} infos
+/** Return images with the list of their lights; in a symmetric one two texels are one light. @param {ImageInfo[]} infos
  * @returns {LightImage[]} */
 export const withLights = (infos) =>
   infos.map((info) => ({
@@ -100,7 +102,7 @@ export function wholeLight(image, lights) {
 }
 
 /** Return the exposure at which the map of an image is shown: the one that is kept, or one that fits.
- * @param {import("../ui_state.js").Ui} ui @param {LightImage} image */
+ * @param {Ui} ui @param {LightImage} image */
 export const exposureOf = ({ mapExposures, weights }, image) =>
   mapExposures[image.name] ?? mapStops(image, weights);
 

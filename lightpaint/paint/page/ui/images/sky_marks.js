@@ -5,10 +5,10 @@ import { add, dot, normalize, subtract } from '../lamp_geometry.js';
 import { t } from '../../language/language.js';
 import { skyDirection, skyPlace } from './texel_arithmetic.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
-/** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
-/** @typedef {import("../lamp_geometry.js").Vector} Vector */
+/** @import { Ui } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
+/** @import { MapPoint } from './texel_arithmetic.js' */
+/** @import { Vector } from '../lamp_geometry.js' */
 /** How a sky lies around the camera. fromWorld: rows of a matrix to the map's axes; up: the vertical
  * there; forward, right: horizontal directions of the camera, frame: of the edge of its picture.
  * @typedef {{up: Vector, forward: Vector | null, right: Vector | null, frame: Vector[]}} SkyView */

@@ -1,11 +1,13 @@
 /** The arithmetic of a gradient, a fill and a sun on the map of an image. */
 
-import { luminance } from '../paint_colour.js';
+import { luminance } from '../../../../viewer/drawing/colour.js';
+import { cross, normalize } from '../lamp_geometry.js';
 import { scaled } from '../lamps/lamp_colours.js';
 import { coverage } from './light_images.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @import { RGB } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
+
 /** A place of the map in rows and columns; whole numbers are the middles of texels.
  * @typedef {[row: number, column: number]} MapPoint */
 /** Colour and brightness, in stops from the mean of the image in the scene.
@@ -19,12 +21,10 @@ const DISC_POINTS = 128;
 export const radianceOf = ({ colour, stops }, mean) =>
   scaled(colour, (mean * 2 ** stops) / luminance(colour));
 
-/**
- * Return the light of every texel in a gradient between two places: beyond them each paint goes on.
+/** Return the light of every texel in a gradient between two places: beyond them each paint goes on.
  * Between them the stops change evenly, and the colour at equal brightness.
  * @param {LightImage} image @param {MapPoint} start @param {MapPoint} end
- * @param {[TexelPaint, TexelPaint]} paints @param {number} mean @returns {Map<number, RGB>}
- */
+ * @param {[TexelPaint, TexelPaint]} paints @param {number} mean @returns {Map<number, RGB>} */
 export function gradientLights(image, start, end, paints, mean) {
   const { places, shares, aspect } = image;
   const [rows, columns] = [places.length, places[0].length];
@@ -87,13 +87,11 @@ export function skyPlace([x, y, z], rows, columns) {
   return [(polar / Math.PI) * (rows - 1), (turn % 1) * columns - 0.5];
 }
 
-/**
- * Return what a sun adds to texels. It lights a surface that faces it as much as an even sky of the
+/** Return what a sun adds to texels. It lights a surface that faces it as much as an even sky of the
  * paint does, whatever its diameter; texels share its light so that their sum comes from its place.
  * @param {LightImage} image of a sky @param {MapPoint} place of its middle
  * @param {number} diameter in degrees @param {TexelPaint} paint @param {number} mean
- * @returns {Map<number, RGB>}
- */
+ * @returns {Map<number, RGB>} */
 export function sunLights(image, place, diameter, paint, mean) {
   const [rows, columns] = [image.places.length, image.places[0].length];
   /** @type {Map<number, number>} */
@@ -120,8 +118,8 @@ function discDirections(middle, diameter) {
   const [x, y, z] = middle;
   // Two axes across; by the middle's smallest component, so that they are never parallel to it.
   const helper = Math.abs(y) < 0.9 ? [0, 1, 0] : [1, 0, 0];
-  const across = unit(crossed(middle, helper));
-  const upwards = crossed(across, middle);
+  const across = normalize(cross(middle, helper));
+  const upwards = cross(across, middle);
   const cap = 1 - Math.cos((Math.PI / 360) * diameter);
   return Array.from({ length: DISC_POINTS }, (_, i) => {
     const cosine = 1 - (cap * (i + 0.5)) / DISC_POINTS;
@@ -132,13 +130,3 @@ function discDirections(middle, diameter) {
     );
   });
 }
-
-/** @param {number[]} a @param {number[]} b */
-const crossed = (a, b) => [
-  a[1] * b[2] - a[2] * b[1],
-  a[2] * b[0] - a[0] * b[2],
-  a[0] * b[1] - a[1] * b[0],
-];
-
-/** @param {number[]} a */
-const unit = (a) => a.map((value) => value / (Math.hypot(...a) || 1));

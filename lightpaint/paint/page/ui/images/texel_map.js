@@ -1,10 +1,10 @@
 /** The texels of an image, to be painted, locked and released on its map. */
 
-import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
+import { ColourMixer } from '../colour_mixers.js';
 import { Button, Choice, Slider, useId } from '../controls.js';
 import { signedText, whiteText } from '../format.js';
 import { stopsOf } from '../level_field.js';
-import { atFullBrightness, toHex, toKelvin } from '../paint_colour.js';
+import { atFullBrightness, toHex, toKelvin } from '../../../../viewer/drawing/colour.js';
 import {
   html,
   useEffect,
@@ -28,12 +28,11 @@ import {
   useTexelStroke,
 } from './texel_stroke.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
-/** @typedef {import("./texel_stroke.js").Place} Place */
-/** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
+/** @import { App, RGB, Ui } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
+/** @import { Place } from './texel_stroke.js' */
+/** @import { MapPoint } from './texel_arithmetic.js' */
+/** @import { SkyView } from './sky_marks.js' */
 
 const TOOLS = [
   {
@@ -139,15 +138,9 @@ function Paint({ ui, app }) {
     if (Math.max(...newColour) > 0) app.store.set({ texelColour: atFullBrightness(newColour) });
   };
   return html`<div class="lamp-colour colour" role="group" aria-label=${t('Paint of texels')}>
-    <div class="colour-row">
-      <span class="dot" aria-hidden="true" style=${{ background: toHex(colour) }}></span>
-      <${Hex} colour=${colour} set=${set} />
-      <${Choice} label=${t('Colour model')} value=${mixer} choices=${MIXERS}
-        change=${(/** @type {Ui["texelMixer"]} */ texelMixer) => app.store.set({ texelMixer })} />
-    </div>
-    ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
-    ${mixer === 'hsv' && html`<${Hsv} colour=${colour} set=${set} hasValue=${false} />`}
-    ${mixer === 'rgb' && html`<${Rgb} colour=${colour} set=${set} />`}
+    <${ColourMixer} colour=${colour} set=${set} mixer=${mixer} isLamp
+      swatch=${html`<span class="dot" aria-hidden="true" style=${{ background: toHex(colour) }}></span>`}
+      choose=${(/** @type {Ui["texelMixer"]} */ texelMixer) => app.store.set({ texelMixer })} />
     <${Slider} label=${t('Brightness')} value=${texelStops} min=${MIN_STOPS} max=${MAX_STOPS} step=${0.1}
       digits=${1} resetValue=${0} unit=${t('st')} tip=${t('Stops from the mean of the image in the scene')}
       change=${(/** @type {number} */ stops) => app.store.set({ texelStops: stops })} />
@@ -156,7 +149,7 @@ function Paint({ ui, app }) {
 
 /** The map, on which the pointer and the keys reach each texel.
  * @param {{image: LightImage, ui: Ui, app: App, held: number[], place: Place | null,
- *   setPlace: (place: Place | null) => void, sky: import("./sky_marks.js").SkyView | null}} props */
+ *   setPlace: (place: Place | null) => void, sky: SkyView | null}} props */
 function Grid({ image, ui, app, held, place, setPlace, sky }) {
   const id = useId();
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
@@ -291,7 +284,7 @@ function stepped(index, step, first, count) {
 }
 
 /** Return a texel in words. @param {LightImage} image @param {Ui} ui @param {number[]} held
- * @param {Place} place @param {import("./sky_marks.js").SkyView | null} sky */
+ * @param {Place} place @param {SkyView | null} sky */
 function texelText(image, ui, held, [row, column], sky) {
   const k = image.places[row][column];
   const where = { column: column + 1, row: row + 1 };

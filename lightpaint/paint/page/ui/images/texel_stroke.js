@@ -1,21 +1,22 @@
 /** A stroke over the map of an image: it paints, locks or releases the texels that it passes, draws a
  * gradient, fills a half of a sky, or places a sun. */
 
-import { endOnEscape } from '../escape_key.js';
+import { endOnEscape } from '../lamps/mark_drag.js';
 import { presentLevel, stopsOf } from '../level_field.js';
-import { atFullBrightness, luminance } from '../paint_colour.js';
+import { atFullBrightness, luminance } from '../../../../viewer/drawing/colour.js';
 import { useEffect, useRef } from '../../vendor/preact.js';
 import { t } from '../../language/language.js';
 import { wholeLight } from './light_images.js';
 import { aboveHorizon, skyViewOf } from './sky_marks.js';
 import { gradientLights, radianceOf, sunLights, texelsToFill } from './texel_arithmetic.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @import { App, RGB, Ui } from '../ui_state.js' */
+/** @import { LightImage } from './light_images.js' */
+/** @import { MapPoint } from './texel_arithmetic.js' */
+
+/** What a press or a drag on the map of an image does to its texels.
+ * @typedef {"paint" | "fill" | "gradient" | "sun" | "lock" | "release"} TexelTool */
 /** @typedef {[row: number, column: number]} Place */
-/** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
 /** A stroke that goes on. start, end: where it began and where it is now, between texels. weights: the
  * answer at its start. ignoreKeys: ends its listening to keys.
  * @typedef {{texels: Set<number>, last: Place, start: MapPoint, end: MapPoint, weights: RGB[],
@@ -25,11 +26,9 @@ import { gradientLights, radianceOf, sunLights, texelsToFill } from './texel_ari
 export const MIN_STOPS = -8;
 export const MAX_STOPS = 12;
 
-/**
- * A stroke of the chosen tool, which becomes a step at its end. Escape cancels it.
+/** A stroke of the chosen tool, which becomes a step at its end. Escape cancels it.
  * @param {LightImage} image @param {Ui} ui @param {App} app
- * @param {(place: Place) => void} visit hears of each place that it comes to
- */
+ * @param {(place: Place) => void} visit hears of each place that it comes to */
 export function useTexelStroke(image, ui, app, visit) {
   const stroke = useRef(/** @type {TexelStroke | null} */ (null));
   const [rows, columns] = [image.places.length, image.places[0].length];

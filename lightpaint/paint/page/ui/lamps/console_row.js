@@ -4,16 +4,7 @@ import { Component, html } from '../../vendor/preact.js';
 import { Button, Checkbox } from '../controls.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-
-/**
- * @typedef {object} ConsoleUi
- * @property {import("../../engine/messages.js").ConsoleInfo | null} console null without one
- */
-
-/** @type {ConsoleUi} */
-export const INITIAL_CONSOLE = { console: null };
+/** @import { App, Ui } from '../ui_state.js' */
 
 /** Milliseconds within which a second press confirms a blackout. */
 const CONFIRM_MS = 3000;

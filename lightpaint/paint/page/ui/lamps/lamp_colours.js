@@ -1,11 +1,10 @@
 /** Changes of the colour and the level of lamps. */
 
 import { filtered } from '../../../../viewer/gels/gels.js';
-import { fromKelvin, luminance, toKelvin, warmer } from '../paint_colour.js';
+import { fromKelvin, luminance, toKelvin, warmer } from '../../../../viewer/drawing/colour.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Light} Light */
-/** @typedef {import("../../../../viewer/gels/gels.js").Gel} Gel */
+/** @import { Light, RGB } from '../ui_state.js' */
+/** @import { Gel } from '../../../../viewer/gels/gels.js' */
 
 /** Ends of a colour temperature, in mireds: 15,000 and 1000 K. */
 const [MIN_MIRED, MAX_MIRED] = [1e6 / 15000, 1000];

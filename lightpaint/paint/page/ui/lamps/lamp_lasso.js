@@ -1,10 +1,10 @@
 /** A lasso over the pictures, which selects the lights whose marks it encloses. */
 
 import { html, useRef, useState } from '../../vendor/preact.js';
+import { isInside } from '../lamp_geometry.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @import { App, Ui } from '../ui_state.js' */
 /** @typedef {[x: number, y: number]} Point */
 
 /** @param {{ui: Ui, app: App}} props */
@@ -61,18 +61,7 @@ function marksWithin(lasso, outline) {
   ]);
   const isWithin = (/** @type {HTMLElement} */ mark) => {
     const box = mark.getBoundingClientRect();
-    return contains(outline, (box.left + box.right) / 2 - left, (box.top + box.bottom) / 2 - top);
+    return isInside(outline, (box.left + box.right) / 2 - left, (box.top + box.bottom) / 2 - top);
   };
   return new Set(marks.filter(isWithin).map((mark) => mark.dataset.lamp ?? ''));
-}
-
-/** Return whether an outline, closed by a line, contains a point: a ray from it crosses it an odd
- * number of times. @param {Point[]} outline @param {number} x @param {number} y */
-function contains(outline, x, y) {
-  let isInside = false;
-  outline.forEach(([x0, y0], i) => {
-    const [x1, y1] = outline[(i + 1) % outline.length];
-    if (y0 > y !== y1 > y && x < x0 + ((y - y0) / (y1 - y0)) * (x1 - x0)) isInside = !isInside;
-  });
-  return isInside;
 }

@@ -5,8 +5,7 @@ import { listedLights } from './listed_lights.js';
 import { lightCountText, shortenName } from '../format.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../ui_state.js").UiStore} UiStore */
+/** @import { Ui, UiStore } from '../ui_state.js' */
 
 /** Keys that are held while a light is pressed.
  * @typedef {{ctrlKey: boolean, metaKey: boolean, shiftKey: boolean}} Modifiers */

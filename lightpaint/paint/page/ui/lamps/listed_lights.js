@@ -1,14 +1,15 @@
 /** The lights as the list shows them: found, sorted, and in groups. */
 
 import { imageOf, meanOf } from '../images/light_images.js';
-import { luminance } from '../paint_colour.js';
+import { luminance } from '../../../../viewer/drawing/colour.js';
 import { findTie } from '../tied_lights.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @import { Ui } from '../ui_state.js' */
+
 /** Lights that the list shows together: one row of its own, a group by name, or an image.
  * @typedef {{name: string | null, members: number[],
- *   image?: import("../images/image_state.js").LightImage}} ListedGroup */
+ *   image?: import("../images/light_images.js").LightImage}} ListedGroup */
 
 /** Number of lights above which names that begin alike make groups, and only unfolded rows have a
  * slider. */

@@ -2,18 +2,17 @@
 
 import { gelOn } from '../../../../viewer/gels/gel_list.js';
 import { gelName } from '../../../../viewer/gels/gels.js';
-import { luminance } from '../paint_colour.js';
+import { luminance } from '../../../../viewer/drawing/colour.js';
 import { lightCountText, signedText } from '../format.js';
 import { findTie, lockedLights, lockingLight } from '../tied_lights.js';
 import { atLevelOf, ownWhite, scaled, warmed, withGel } from './lamp_colours.js';
 import { lightsText } from './light_selection.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../ui_state.js").Constraints} Constraints */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../session_controller.js").SessionController} SessionController */
-/** @typedef {import("../../../../viewer/gels/gels.js").Gel} Gel */
+/** @import { Constraints, RGB, Ui } from '../ui_state.js' */
+/** @import { SessionController } from '../session_controller.js' */
+/** @import { Gel } from '../../../../viewer/gels/gels.js' */
+
 /** @typedef {{lights: Map<number, RGB>, label: string, isFinal: boolean}} Change */
 
 export class ManyLights {
@@ -205,23 +204,6 @@ export class ManyLights {
       Object.fromEntries(entries),
       t('{lights} off', { lights: lightsText(ui, lit) }),
     );
-  }
-
-  /** Put lights, and all that is tied to them, on one dimmer. @param {number[]} lights */
-  tie(lights) {
-    const ui = this.store.value;
-    const names = adjustableLights(ui, lights).map((k) => ui.lights[k].name);
-    const isJoined = (/** @type {string[]} */ tie) => tie.some((name) => names.includes(name));
-    const joined = [...new Set([...ui.ties.filter(isJoined).flat(), ...names])];
-    return this.session.tieAll([...ui.ties.filter((tie) => !isJoined(tie)), joined]);
-  }
-
-  /** Take lights off their dimmers. @param {number[]} lights */
-  untie(lights) {
-    const ui = this.store.value;
-    const names = lights.map((k) => ui.lights[k].name);
-    const ties = ui.ties.map((tie) => tie.filter((name) => !names.includes(name)));
-    return this.session.tieAll(ties.filter((tie) => tie.length > 1));
   }
 }
 

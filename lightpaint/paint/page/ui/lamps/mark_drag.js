@@ -1,12 +1,10 @@
 /** Drags of the marks of lights. */
 
-import { endOnEscape } from '../escape_key.js';
 import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
 
-/** @typedef {import("../engine_interface.js").Pane} Pane */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../../engine/messages.js").LightPlace} LightPlace */
-/** @typedef {import("../lamp_moves.js").LampRequest} LampRequest */
+/** @import { App, Pane } from '../ui_state.js' */
+/** @import { LightPlace } from '../../engine/messages.js' */
+/** @import { LampRequest } from '../lamp_moves.js' */
 
 /** A drag that goes on. x, y: where it began, on the screen. dx, dy: from the mark's middle to there.
  * mark: where the mark belongs.
@@ -16,15 +14,13 @@ import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
 /** CSS pixels that the pointer goes before a press becomes a drag: a hand is never quite still. */
 export const DRAG_MIN_PIXELS = 4;
 
-/**
- * A drag of a mark: it requests a place at every move, and keeps the last. The mark itself follows
+/** A drag of a mark: it requests a place at every move, and keeps the last. The mark itself follows
  * each move at once; what else shows the place is drawn with the answer, since frames of the whole
  * page would take the time of the answers.
  * @param {App} app @param {Pane} pane
  * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
  *   {place: Partial<LightPlace>, aimPixel?: [number, number], mark: {x: number, y: number} | null,
- *    request: LampRequest} | null} resolveDrag from the place of the pointer, in pixels of the picture
- */
+ *    request: LampRequest} | null} resolveDrag from the place of the pointer, in pixels of the picture */
 export function useMarkDrag(app, pane, resolveDrag) {
   const current = useRef(/** @type {Drag | null} */ (null));
   const onEscape = useRef(/** @type {() => void} */ (() => {}));
@@ -104,4 +100,17 @@ function shiftMark({ button, mark }) {
   if (!mark) return;
   const [left, top] = [button.style.left, button.style.top].map(parseFloat);
   button.style.translate = [mark.x - left, mark.y - top].map((offset) => `${offset}px`).join(' ');
+}
+
+/** Call `cancel` once Escape is pressed. @param {() => void} cancel @returns {() => void} to stop it */
+export function endOnEscape(cancel) {
+  const controller = new AbortController();
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== 'Escape') return;
+    event.preventDefault();
+    event.stopPropagation();
+    cancel();
+  };
+  window.addEventListener('keydown', press, { signal: controller.signal, capture: true });
+  return () => controller.abort();
 }

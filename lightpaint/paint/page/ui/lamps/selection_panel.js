@@ -1,19 +1,17 @@
 /** What is done to all selected lights, each time as one step. */
 
-import { Button } from '../controls.js';
-import { lightCountText, signedText, stopsText } from '../format.js';
-import { gradient } from '../kelvin_slider.js';
+import { Button, Slider, useDraft } from '../controls.js';
+import { lightCountText, signedText, stopsText, cleanNumberText } from '../format.js';
+import { gradient } from '../colour_mixers.js';
 import { stopsOf } from '../level_field.js';
-import { fromKelvin } from '../paint_colour.js';
+import { fromKelvin } from '../../../../viewer/drawing/colour.js';
 import { findTie } from '../tied_lights.js';
 import { html, useState } from '../../vendor/preact.js';
 import { LampColour } from './lamp_colour.js';
 import { adjustableLights, colouredLights, isHeld } from './many_lights.js';
-import { RelativeSlider, parseMired, parseStops } from './relative_dimmer.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @import { App, Ui } from '../ui_state.js' */
 
 /** Ends of the sliders, in stops and in mireds. */
 const [DIM_RANGE, WARM_RANGE] = [4, 100];
@@ -67,8 +65,10 @@ export function SelectionPanel({ ui, app }) {
 /** @param {{ui: Ui, app: App, hasColour: boolean, showColour: (isShown: boolean) => void}} props */
 function Actions({ ui, app, hasColour, showColour }) {
   const { selectedLights: lights, constraints, solo } = ui;
-  const { many } = app.session;
+  const { session } = app;
+  const { many } = session;
   const adjustable = adjustableLights(ui, lights);
+  const names = adjustable.map((k) => ui.lights[k].name);
   const areHeld = adjustable.length > 0 && adjustable.every((k) => isHeld(ui, k));
   const areOff =
     adjustable.length > 0 && adjustable.every((k) => constraints[ui.lights[k].name]?.off);
@@ -90,7 +90,7 @@ function Actions({ ui, app, hasColour, showColour }) {
       act=${() => void (areOff ? many.unlock(lights) : many.switchOff(lights))} />
     <${Button} label=${areTied ? t('Untie') : t('Tie')} disabled=${adjustable.length < 2}
       tip=${areTied ? t('Give each its own dimmer') : t('Put all on one dimmer')}
-      act=${() => void (areTied ? many.untie(lights) : many.tie(lights))} />
+      act=${() => void (areTied ? session.untie(names) : session.tie(names))} />
     <${Button} label=${t('Solo')} pressed=${isSolo} tip=${t('Show these alone. The answer does not change.')}
       act=${toggleSolo} />
   </div>`;
@@ -109,3 +109,67 @@ export function levelsText(ui, lights) {
     : t('{low} to {high} st', { low: signedText(low), high: signedText(high) });
   return stops.length < levels.length ? t('{text}, some off', { text }) : text;
 }
+
+/** A slider whose middle is not a change, and a field for the same in numbers.
+ * @param {{label: string, range: number, step: number, text: (amount: number) => string, tip: string,
+ *   parse: (text: string) => number | null, hint: string, change: (amount: number, isFinal: boolean) => void,
+ *   say: (text: string) => void, disabled?: boolean, isPlain?: boolean, track?: string}} props
+ * parse: null for text that is none. hint: what can be typed. isPlain: without a visible label */
+function RelativeSlider(props) {
+  const { label, range, step, text, parse, hint, change, say, disabled, isPlain, track, tip } =
+    props;
+  const [amount, setAmount] = useState(0);
+  const [draft, setDraft, draftRef] = useDraft();
+  const move = (/** @type {number} */ newAmount, /** @type {boolean} */ isFinal) => {
+    setAmount(isFinal ? 0 : newAmount);
+    change(newAmount, isFinal);
+  };
+  const take = () => {
+    const typed = draftRef.current?.trim();
+    setDraft(null);
+    if (!typed) return;
+    const parsed = parse(cleanNumberText(typed).toLowerCase());
+    if (parsed === null) say(t('{typed} is not a change. {hint}', { typed, hint }));
+    else if (parsed !== 0) change(parsed, true);
+  };
+  const press = (/** @type {any} */ event) => {
+    const sign = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
+    if (event.key === 'Enter') take();
+    if (event.key === 'Escape') setDraft(null);
+    if (!sign) return;
+    event.preventDefault();
+    change(sign * step * (event.shiftKey ? 10 : 1), true);
+  };
+  return html`<div class="relative">
+    ${!isPlain && html`<span class="name" aria-hidden="true">${label}</span>`}
+    <${Slider} plain label=${label} value=${amount} min=${-range} max=${range} step=${step}
+      text=${text(amount)} disabled=${disabled} change=${move} tip=${tip} track=${track} />
+    <input class="level" type="text" autocomplete="off" spellcheck=${false} disabled=${disabled}
+      data-typed=${draft === null ? 'no' : 'yes'} aria-label=${t('{label} by', { label })} data-tip=${hint}
+      placeholder=${amount ? text(amount) : '±0'} value=${draft ?? ''}
+      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
+      onBlur=${take} onKeyDown=${press} />
+  </div>`;
+}
+
+/** Parse a change of level: stops (`-1`, `+0.5 st`), a factor in percent (`50 %`) or `off`.
+ * @param {string} text @returns {number | null} in stops */
+function parseStops(text) {
+  if (text === 'off') return -Infinity;
+  const match = /^([+-]?(?:\d+\.?\d*|\.\d+))\s*(%|st|stops?)?$/.exec(text);
+  if (!match) return null;
+  const amount = Number(match[1]);
+  if (match[2] === '%') return amount >= 0 ? Math.log2(amount / 100) : null;
+  return Math.abs(amount) <= MAX_TYPED_STOPS ? amount : null;
+}
+
+/** Largest typed change, in stops. */
+const MAX_TYPED_STOPS = 20;
+
+/** Parse a change of warmth. @param {string} text like `20`, `-35 mired` @returns {number | null} */
+function parseMired(text) {
+  const match = /^([+-]?(?:\d+\.?\d*|\.\d+))\s*(?:mired|mk)?$/.exec(text);
+  return match && Math.abs(Number(match[1])) <= MAX_TYPED_MIRED ? Number(match[1]) : null;
+}
+
+const MAX_TYPED_MIRED = 500;

@@ -5,8 +5,7 @@ import { lockedLights } from '../tied_lights.js';
 import { html } from '../../vendor/preact.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @import { App, Ui } from '../ui_state.js' */
 
 /** Strengths of the pull at both ends of the slider, and the one that it begins with: at the first
  * it is not felt beside the paint, at the last the paint is hardly felt. */

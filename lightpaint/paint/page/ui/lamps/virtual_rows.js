@@ -9,11 +9,9 @@ const MARGIN = 300;
 /** Height of a folded row in pixels, until one has been measured. */
 const ROW_HEIGHT = 67;
 
-/**
- * @typedef {{rows: number[], nameOf: (row: number) => string, isOpen: (row: number) => boolean,
+/** @typedef {{rows: number[], nameOf: (row: number) => string, isOpen: (row: number) => boolean,
  *   render: (row: number) => unknown, label: string}} Props
- * @typedef {{first: number, last: number, focus: number}} Range places in `rows`; focus: -1 for none
- */
+ * @typedef {{first: number, last: number, focus: number}} Range places in `rows`; focus: -1 for none */
 
 /** @extends {Component<Props, Range>} */
 export class VirtualRows extends Component {

@@ -3,9 +3,8 @@
 import { html } from '../../vendor/preact.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../../engine/messages.js").Layer} Layer */
-/** @typedef {import("../../engine/messages.js").WishDelivery} WishDelivery */
+/** @import { Ui } from '../ui_state.js' */
+/** @import { Layer } from '../../engine/messages.js' */
 
 /** Least share of a change that has to come, as in `MIN_DELIVERED` of delivery.py. */
 const MIN_DELIVERED = 0.75;

@@ -6,8 +6,7 @@ import { t } from '../../language/language.js';
 import { sendFile } from '../file_parts.js';
 import { addReference, isPicture } from '../references/reference_files.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
+/** @import { App, Ui } from '../ui_state.js' */
 
 /** Files that may hold layers, by how their names end. */
 const ENDINGS = ['.ora', '.exr'];

@@ -1,10 +1,9 @@
 /** Where a layer applies, over the pictures: what it does not cover is dimmed. */
 
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
+import { drawOverPanes, fitCanvas, placesOf } from '../pane_canvas.js';
 
-/** @typedef {import("../engine_interface.js").Engine} Engine */
-/** @typedef {import("../engine_interface.js").Pane} Pane */
-/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @import { Engine, Pane, Ui } from '../ui_state.js' */
 
 /** Alpha of the veil where nothing is covered: under the pointer, and while a mask is painted. */
 const [SHOWN_ALPHA, PAINTED_ALPHA] = [200, 130];
@@ -14,7 +13,7 @@ export function LayerMask({ ui, engine, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const id = ui.hoveredLayer ?? ui.maskLayer;
   const isThere = id !== null && ui.layers.some((layer) => layer.id === id);
-  const places = panes.map((pane) => Object.values(pane).join(' ')).join();
+  const places = placesOf(panes);
   useLayoutEffect(() => {
     if (!ref.current || !isThere || id === null) return undefined;
     const alpha = ui.hoveredLayer === null ? PAINTED_ALPHA : SHOWN_ALPHA;
@@ -42,29 +41,9 @@ export function LayerMask({ ui, engine, panes }) {
  * @param {{data: Float32Array, width: number, height: number}} coverage @param {Pane[]} panes
  * @param {number} most alpha */
 function draw(canvas, { data, width, height }, panes, most) {
-  const ratio = Math.max(1, window.devicePixelRatio || 1);
-  canvas.width = Math.round(canvas.clientWidth * ratio);
-  canvas.height = Math.round(canvas.clientHeight * ratio);
-  const context = canvas.getContext('2d');
+  const { context, ratio } = fitCanvas(canvas);
   if (!context || !data.length) return;
-  const veil = document.createElement('canvas');
-  veil.width = width;
-  veil.height = height;
-  const image = new ImageData(width, height);
-  for (let p = 0; p < data.length; p += 1) image.data[4 * p + 3] = most * (1 - data[p]);
-  veil.getContext('2d')?.putImageData(image, 0, 0);
-  for (const pane of panes) {
-    context.save();
-    context.beginPath();
-    context.rect(pane.x * ratio, pane.y * ratio, pane.width * ratio, pane.height * ratio);
-    context.clip();
-    context.drawImage(
-      veil,
-      pane.left * ratio,
-      pane.top * ratio,
-      width * pane.scale * ratio,
-      height * pane.scale * ratio,
-    );
-    context.restore();
-  }
+  const veil = new ImageData(width, height);
+  for (let p = 0; p < data.length; p += 1) veil.data[4 * p + 3] = most * (1 - data[p]);
+  drawOverPanes(context, veil, panes, ratio);
 }

@@ -2,8 +2,7 @@
 
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../../engine/messages.js").Layer} Layer */
-/** @typedef {import("../../engine/messages.js").ChangeLayers} ChangeLayers */
+/** @import { ChangeLayers, Layer } from '../../engine/messages.js' */
 /** A row of the list, the topmost first: members of a group follow it.
  * @typedef {{layer: Layer, group: number | null}} Row */
 

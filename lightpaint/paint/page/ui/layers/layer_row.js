@@ -4,7 +4,7 @@ import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 import { renamed } from '../../engine/layers/layer_names.js';
 import { warmer } from '../../../../viewer/drawing/colour.js';
 import { Button, NumberField, Slider, TextField } from '../controls.js';
-import { GradientFields } from '../selection/gradient_fields.js';
+import { GradientFields } from '../selection/gradient_options.js';
 import { Icon } from '../icons.js';
 import { chooseTool } from '../tools.js';
 import {
@@ -17,10 +17,8 @@ import {
 import { LayerDelivery } from './layer_delivery.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../../engine/messages.js").Layer} Layer */
-/** @typedef {import("../../engine/messages.js").ChangeLayers} ChangeLayers */
+/** @import { App, RGB, Ui } from '../ui_state.js' */
+/** @import { ChangeLayers, Layer } from '../../engine/messages.js' */
 
 /** Size of the small picture of a layer, in pixels. */
 const THUMBNAIL = { width: 40, height: 24 };
@@ -31,10 +29,8 @@ const TIMES = {
   toValue: (/** @type {number} */ x) => Number((10 ** (Math.abs(x) < 0.03 ? 0 : x)).toPrecision(2)),
 };
 
-/**
- * @param {{ui: Ui, app: App, layer: Layer, isInner: boolean, isActive: boolean,
- *   isUnfolded: boolean, isChosen: boolean}} props
- */
+/** @param {{ui: Ui, app: App, layer: Layer, isInner: boolean, isActive: boolean,
+ *   isUnfolded: boolean, isChosen: boolean}} props */
 export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChosen }) {
   const { store, engine } = app;
   const { id, name, is_visible: isVisible } = layer;
@@ -178,7 +174,7 @@ function Adjustment({ layer, set }) {
   </div>`;
 }
 
-/** Return the change in mired of a tint, to the nearest. @param {import("../engine_interface.js").RGB} tint */
+/** Return the change in mired of a tint, to the nearest. @param {RGB} tint */
 function miredOf(tint) {
   const ratio = tint[0] / tint[2];
   let [low, high] = [-400, 400];
@@ -242,10 +238,7 @@ function pressKey(event, app, layer) {
     const at = names().indexOf(element);
     const ids = selectedLayers.includes(layer.id) ? selectedLayers : [layer.id];
     engine.changeLayers(withoutLayers(layers, ids));
-    store.set({
-      layerNote: t('{name} deleted', { name: layer.name }),
-      hoveredLayer: null,
-    });
+    store.set({ layerNote: t('{name} deleted', { name: layer.name }), hoveredLayer: null });
     requestAnimationFrame(() => names()[Math.min(at, names().length - 1)]?.focus());
   } else return;
   event.preventDefault();

@@ -1,10 +1,8 @@
 /** The cells of measuring planes as the picture of a view shows them. */
 
-import { add, projectPolygon } from '../lamp_geometry.js';
+import { add, isInside, projectPolygon } from '../lamp_geometry.js';
 
-/** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
-/** @typedef {import("../../engine/messages.js").PlanesInfo} PlanesInfo */
-/** @typedef {import("../../engine/messages.js").Camera} Camera */
+/** @import { Camera, MeasuredPlane, PlanesInfo } from '../../engine/messages.js' */
 /**
  * A cell that nothing covers. corners: in pixels of the picture; a single one for a listed point.
  * plane, point: indices.
@@ -68,15 +66,4 @@ export function cellAt(cells, x, y, radius) {
         ? Math.hypot(corners[0][0] - x, corners[0][1] - y) <= radius
         : isInside(corners, x, y),
     );
-}
-
-/** Return whether a polygon has a point, by the sides that a ray to the right crosses.
- * @param {[number, number][]} corners @param {number} x @param {number} y */
-function isInside(corners, x, y) {
-  let isIn = false;
-  corners.forEach(([ax, ay], k) => {
-    const [bx, by] = corners[(k + 1) % corners.length];
-    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) isIn = !isIn;
-  });
-  return isIn;
 }

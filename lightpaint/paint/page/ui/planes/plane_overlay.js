@@ -3,13 +3,13 @@
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 import { overlayOf } from '../display_state.js';
 import { numberText } from '../format.js';
+import { clipToPane, devicePane, fitCanvas } from '../pane_canvas.js';
 import { t } from '../../language/language.js';
 import { DOT_RADIUS, cellAt, cellsInView } from './plane_cells.js';
 import { colourOf, luxText, scaleTop } from './plane_picture.js';
 
-/** @typedef {import("../engine_interface.js").Pane} Pane */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("./plane_cells.js").PlaneCell} PlaneCell */
+/** @import { Pane, Ui } from '../ui_state.js' */
+/** @import { PlaneCell } from './plane_cells.js' */
 
 /** Share of the time that drawing takes at most while a stroke is made; at rest, all is drawn. */
 const LARGEST_SHARE = 0.1;
@@ -96,20 +96,13 @@ export function PlanesOverlay({ ui, panes }) {
 
 /** @param {HTMLCanvasElement} canvas @param {PlaneCell[]} cells @param {Pane} pane @param {Ui} ui */
 function draw(canvas, cells, pane, { planes, planesReading, planeCase, state }) {
-  const context = canvas.getContext('2d');
+  const { context, ratio } = fitCanvas(canvas);
   if (!context || !planes || !planesReading) return;
-  const ratio = Math.max(1, window.devicePixelRatio || 1);
-  canvas.width = Math.round(canvas.clientWidth * ratio);
-  canvas.height = Math.round(canvas.clientHeight * ratio);
   const [rows, columns] = state.size;
-  const scale = pane.scale * ratio;
-  context.beginPath();
-  context.rect(pane.x * ratio, pane.y * ratio, pane.width * ratio, pane.height * ratio);
-  context.clip();
-  context.translate(pane.left * ratio, pane.top * ratio);
-  context.beginPath();
-  context.rect(0, 0, columns * scale, rows * scale);
-  context.clip();
+  const { scale, left, top: above, ...frame } = devicePane(pane, ratio);
+  clipToPane(context, frame);
+  context.translate(left, above);
+  clipToPane(context, { x: 0, y: 0, width: columns * scale, height: rows * scale });
   const top = scaleTop(planes, planesReading, caseOf({ planes, planeCase }));
   for (const { plane, point, corners } of cells) {
     const lux = planesReading.planes[plane].lux[point];

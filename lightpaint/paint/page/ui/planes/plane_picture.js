@@ -3,7 +3,7 @@
 import { numberText } from '../format.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
+/** @import { MeasuredPlane, PlanesInfo, PlanesReading } from '../../engine/messages.js' */
 
 /** Colours from little to much light, as in the pictures of reports: they also differ in lightness,
  * for those who see few colours. */
@@ -26,8 +26,8 @@ const STEPS = 10;
 export const luxText = (lux) => t('{value} lx', { value: numberText(Number(lux.toPrecision(3))) });
 
 /** Return the illuminance of the brightest colour: of the planes in a case, rounded up as in the
- * isolux pictures of reports. @param {import("../../engine/messages.js").PlanesInfo} info
- * @param {import("../../engine/messages.js").PlanesReading} reading @param {string} shownCase */
+ * isolux pictures of reports. @param {PlanesInfo} info
+ * @param {PlanesReading} reading @param {string} shownCase */
 export function scaleTop(info, reading, shownCase) {
   const inCase = reading.planes.filter((_, k) => info.planes[k].case === shownCase);
   return roundedUp(Math.max(0, ...inCase.map(({ most }) => most)));

@@ -5,16 +5,14 @@ import { Button, Checkbox, Select } from '../controls.js';
 import { overlayOf } from '../display_state.js';
 import { numberText } from '../format.js';
 import { updateDisplay } from '../tools.js';
+import { toggled } from '../ui_store.js';
 import { t } from '../../language/language.js';
 import { cellsInView } from './plane_cells.js';
 import { caseOf, casesOf, hasPlanesInView } from './plane_overlay.js';
 import { drawPlane, luxText, scaleTop } from './plane_picture.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
-/** @typedef {import("../../engine/messages.js").PlaneLight} PlaneLight */
-/** @typedef {import("../../engine/messages.js").PlaneWish} PlaneWish */
+/** @import { App, Ui } from '../ui_state.js' */
+/** @import { MeasuredPlane, PlaneLight, PlaneWish } from '../../engine/messages.js' */
 
 /** Standard errors of the ends of a 95 % interval. */
 const NORMAL_95 = 1.96;
@@ -77,9 +75,7 @@ function EyeButton({ ui, app, index }) {
     return html`<span class="faint" data-tip=${t('Something covers it, or it lies behind the camera')}>${t('not in view')}</span>`;
   const isHidden = ui.hiddenPlanes.includes(name);
   const toggle = () =>
-    app.store.set(({ hiddenPlanes }) => ({
-      hiddenPlanes: isHidden ? hiddenPlanes.filter((x) => x !== name) : [...hiddenPlanes, name],
-    }));
+    app.store.set(({ hiddenPlanes }) => ({ hiddenPlanes: toggled(hiddenPlanes, name) }));
   return html`<${Button} icon=${isHidden ? 'hidden' : 'eye'} act=${toggle}
     tip=${isHidden ? t('Show {name} in the picture', { name }) : t('Hide {name} in the picture', { name })} />`;
 }

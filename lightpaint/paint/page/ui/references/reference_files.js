@@ -4,7 +4,7 @@ import { useEffect } from '../../vendor/preact.js';
 import { sendFile } from '../file_parts.js';
 import { isTyping } from '../keyboard.js';
 
-/** @typedef {import("../shortcuts.js").App} App */
+/** @import { App } from '../ui_state.js' */
 
 /** Files that are pictures, by how their names end. */
 export const PICTURE_ENDINGS = [

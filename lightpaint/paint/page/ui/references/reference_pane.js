@@ -8,9 +8,8 @@ import { PICTURE_ENDINGS, addReference } from './reference_files.js';
 import { ReferencePicture } from './reference_picture.js';
 import { shownPairs, shownReference } from './reference_state.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./reference_state.js").ComparedAreas} ComparedAreas */
+/** @import { App, Ui } from '../ui_state.js' */
+/** @import { ComparedAreas } from './reference_state.js' */
 
 /** @type {{value: ComparedAreas, label: string, tip: string}[]} */
 const AREAS = [

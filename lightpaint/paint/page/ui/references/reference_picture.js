@@ -7,10 +7,8 @@ import { Thumbnail } from '../thumbnail.js';
 import { pickPaint } from '../tools.js';
 import { shownPairs } from './reference_state.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../engine_interface.js").RGB} RGB */
-/** @typedef {import("../../engine/messages.js").ReferenceInfo} ReferenceInfo */
+/** @import { App, Pane, RGB, Ui } from '../ui_state.js' */
+/** @import { ReferenceInfo } from '../../engine/messages.js' */
 /** @typedef {[number, number]} Place as shares of width and height */
 
 /** Pixels of the reduced light on each side of a place that are picked together. */
@@ -91,7 +89,7 @@ function PairMark({ place: [x, y], label, isOpen }) {
     style=${{ left: `${100 * x}%`, top: `${100 * y}%` }}>${label}</i>`;
 }
 
-/** The places of pairs in the pictures. @param {{ui: Ui, panes: import("../engine_interface.js").Pane[]}} props */
+/** The places of pairs in the pictures. @param {{ui: Ui, panes: Pane[]}} props */
 export function PairMarks({ ui, panes }) {
   if (!ui.isReferenceOpen || ui.comparedAreas !== 'pairs') return null;
   const [rows, columns] = ui.state.size;

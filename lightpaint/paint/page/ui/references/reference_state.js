@@ -1,45 +1,22 @@
-/** The state of the interface that is about reference pictures. */
+/** Which reference picture is shown, with its pairs of places. */
 
-/** @typedef {import("../../engine/messages.js").PlacePair} PlacePair */
+/** @import { Ui } from '../ui_state.js' */
 /** @typedef {"whole" | "regions" | "parts" | "pairs"} ComparedAreas */
 
-/**
- * @typedef {object} ReferenceState
- * @property {import("../../engine/messages.js").ReferenceInfo[]} references the oldest first
- * @property {boolean} isReferenceOpen whether their pane is shown
- * @property {number | null} reference id of the one that is shown; null for the last one
- * @property {boolean} isReferenceComing whether a file is being read
- * @property {ComparedAreas} comparedAreas
- * @property {boolean} matchesBrightness
- * @property {(PlacePair & {owner: number, view: number})[]} placePairs of all references: `owner` is
- *   the id of one
- */
-
-/** @type {ReferenceState} */
-export const INITIAL_REFERENCES = {
-  references: [],
-  isReferenceOpen: false,
-  reference: null,
-  isReferenceComing: false,
-  comparedAreas: 'regions',
-  matchesBrightness: false,
-  placePairs: [],
-};
-
-/** Return the reference that is shown; undefined without any. @param {ReferenceState} ui */
+/** Return the reference that is shown; undefined without any. @param {Pick<Ui, "references" | "reference">} ui */
 export const shownReference = ({ references, reference }) =>
   references.find(({ id }) => id === reference) ?? references.at(-1);
 
 /** Return the pairs of the shown reference in the shown view.
- * @param {ReferenceState & {view: number}} ui */
+ * @param {Ui} ui */
 export const shownPairs = (ui) =>
   ui.placePairs.filter(
     ({ owner, view }) => owner === shownReference(ui)?.id && view === ui.view,
   );
 
 /** Take the list of references; a new one is shown.
- * @param {{references: ReferenceState["references"]}} message @param {ReferenceState} previous
- * @returns {Partial<ReferenceState>} */
+ * @param {Pick<Ui, "references">} message @param {Ui} previous
+ * @returns {Partial<Ui>} */
 export function referencesUpdate({ references }, previous) {
   const known = previous.references.map(({ id }) => id);
   const added = references.find(({ id }) => !known.includes(id));

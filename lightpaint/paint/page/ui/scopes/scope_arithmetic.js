@@ -33,10 +33,8 @@ export function histogram({ data, width, height }) {
   return counts;
 }
 
-/**
- * Return a waveform: in each column of the picture how many pixels have each level, 100 % on top.
- * @param {Codes} codes @param {0 | 1 | 2 | "luma"} channel @returns {Trace}
- */
+/** Return a waveform: in each column of the picture how many pixels have each level, 100 % on top.
+ * @param {Codes} codes @param {0 | 1 | 2 | "luma"} channel @returns {Trace} */
 export function waveform({ data, width, height }, channel) {
   const counts = new Float32Array(width * LEVELS);
   for (let p = 0, i = 0; p < width * height; p += 1, i += 4) {

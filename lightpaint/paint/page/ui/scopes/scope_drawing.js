@@ -2,9 +2,8 @@
 
 import { histogram, LEVELS, traceAlpha, vectorscope, waveform } from './scope_arithmetic.js';
 
-/** @typedef {import("./scope_arithmetic.js").Codes} Codes */
-/** @typedef {import("./scope_arithmetic.js").Trace} Trace */
-/** @typedef {import("./scope_state.js").ScopeKind} ScopeKind */
+/** @import { Codes, Trace } from './scope_arithmetic.js' */
+/** @typedef {"histogram" | "waveform" | "parade" | "vectorscope"} ScopeKind */
 
 /** Pixels of a side of a vectorscope. */
 export const VECTOR_SIZE = 200;
@@ -13,12 +12,7 @@ export const VECTOR_SIZE = 200;
 const HISTOGRAM_HEIGHT = 120;
 
 /** Colours of red, green, blue and luma, bright enough to be distinguished on black. */
-const INKS = [
-  [255, 90, 80],
-  [90, 220, 110],
-  [100, 150, 255],
-  [225, 225, 228],
-];
+const INKS = [[255, 90, 80], [90, 220, 110], [100, 150, 255], [225, 225, 228]];
 
 /** @param {HTMLCanvasElement} canvas @param {ScopeKind} kind @param {Codes} codes */
 export function drawScope(canvas, kind, codes) {

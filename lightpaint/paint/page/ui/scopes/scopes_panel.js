@@ -6,10 +6,9 @@ import { t } from '../../language/language.js';
 import { drawScope, VECTOR_SIZE } from './scope_drawing.js';
 import { clippedPart, histogram, percentile, placeOf, SKIN_ANGLE, targets } from './scope_arithmetic.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./scope_arithmetic.js").Codes} Codes */
-/** @typedef {import("./scope_state.js").ScopeKind} ScopeKind */
+/** @import { App, Ui } from '../ui_state.js' */
+/** @import { Codes } from './scope_arithmetic.js' */
+/** @import { ScopeKind } from './scope_drawing.js' */
 
 const KINDS = [
   {

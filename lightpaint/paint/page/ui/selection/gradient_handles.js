@@ -3,11 +3,8 @@
 import { html, useRef } from '../../vendor/preact.js';
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../engine_interface.js").Pane} Pane */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("../../engine/messages.js").Gradient} Gradient */
-/** @typedef {import("../../engine/messages.js").Layer} Layer */
+/** @import { App, Pane, Ui } from '../ui_state.js' */
+/** @import { Gradient, Layer } from '../../engine/messages.js' */
 
 /** @type {{end: "start" | "end", label: string}[]} */
 const ENDS = [

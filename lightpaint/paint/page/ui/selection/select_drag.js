@@ -2,12 +2,10 @@
 
 import { modeOf, updateSelection } from './selection_settings.js';
 
-/** @typedef {import("../engine_interface.js").Engine} Engine */
-/** @typedef {import("../engine_interface.js").Kind} Kind */
-/** @typedef {import("../ui_state.js").UiStore} UiStore */
-/** @typedef {import("./selection_settings.js").Corner} Corner */
-/** @typedef {import("./selection_settings.js").Mode} Mode */
-/** @typedef {import("./selection_settings.js").Part} Part */
+/** @import { Engine, Kind, UiStore } from '../ui_state.js' */
+/** @import { Corner } from '../../engine/selection/polygon_mask.js' */
+/** @import { Mode } from '../../engine/selection/mask_operations.js' */
+/** @import { Part } from '../../engine/selection/selections.js' */
 /** @typedef {{x: number, y: number, kind: Kind}} Place */
 /** @typedef {{shiftKey: boolean, altKey: boolean}} Modifiers */
 

@@ -6,8 +6,7 @@ import { MODES, SHAPES, updateSelection } from './selection_settings.js';
 import { t } from '../../language/language.js';
 import { shortcutsOf } from '../key_bindings.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
+/** @import { App, Ui } from '../ui_state.js' */
 
 /** Widest soft edge, in pixels, and largest tolerance, in ΔE. */
 export const MAX_FEATHER = 200;

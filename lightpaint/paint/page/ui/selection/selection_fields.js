@@ -7,12 +7,11 @@ import { MODES, selectedText, updateSelection } from './selection_settings.js';
 import { t } from '../../language/language.js';
 import { shortcutsOf } from '../key_bindings.js';
 
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../shortcuts.js").App} App */
-/** @typedef {import("./selection_settings.js").Part} Part */
-/** @typedef {import("./selection_settings.js").SelectionUi} SelectionUi */
+/** @import { App, Ui } from '../ui_state.js' */
+/** @import { Change, Part } from '../../engine/selection/selections.js' */
+/** @import { SelectionUi, TypedKind } from './selection_settings.js' */
 
-/** @type {{value: import("./selection_settings.js").TypedKind, label: string}[]} */
+/** @type {{value: TypedKind, label: string}[]} */
 const KINDS = [
   { value: 'rectangle', label: t('Rectangle') },
   { value: 'ellipse', label: t('Ellipse') },
@@ -33,7 +32,7 @@ export function SelectionFields({ ui, app }) {
   const set = (/** @type {Partial<SelectionUi>} */ changes) => updateSelection(store, changes);
   const part = partOf(ui);
   const change =
-    (/** @type {import("../../engine/selection/selections.js").Change} */ made) => () =>
+    (/** @type {Change} */ made) => () =>
       engine.selections.change(made);
   const { pixels, current } = selection;
   const select = () =>
@@ -120,13 +119,7 @@ function partOf({ selection, state, lights }) {
   }
   if (kind === 'brightness') return { kind, picture, low: brightness[0], high: brightness[1] };
   const { x, y, width, height } = box;
-  return {
-    kind,
-    corners: [
-      [x, y],
-      [x + width, y + height],
-    ],
-  };
+  return { kind, corners: [[x, y], [x + width, y + height]] };
 }
 
 /** @param {string[]} names */

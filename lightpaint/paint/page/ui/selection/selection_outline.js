@@ -2,11 +2,10 @@
 
 import { ellipse, rectangle } from '../../engine/selection/polygon_mask.js';
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
+import { devicePane, distinctPanes, drawOverPanes, fitCanvas, placesOf } from '../pane_canvas.js';
 
-/** @typedef {import("../engine_interface.js").Engine} Engine */
-/** @typedef {import("../engine_interface.js").Pane} Pane */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../../engine/selection/selections.js").Selection} Selection */
+/** @import { Engine, Pane, Ui } from '../ui_state.js' */
+/** @import { Selection } from '../../engine/selection/selection_mirror.js' */
 /** Indices of the pixels of an outline in an image, and the sum of their row and column.
  * @typedef {{image: ImageData, x: number, y: number, pixels: Int32Array, diagonals: Int32Array}} Ants */
 
@@ -26,19 +25,16 @@ export function SelectionOutline({ ui, engine, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const { current, show, draft } = ui.selection;
   const isTinted = show === 'tint' || Boolean(current?.isFaint);
-  const places = panes.map((pane) => Object.values(pane).join(' ')).join();
+  const places = placesOf(panes);
   useLayoutEffect(() => {
     const selection = engine.selections.current;
     const canvas = ref.current;
     if (!canvas || !selection) return undefined;
-    const ratio = Math.max(1, window.devicePixelRatio || 1);
-    canvas.width = Math.round(canvas.clientWidth * ratio);
-    canvas.height = Math.round(canvas.clientHeight * ratio);
-    const context = canvas.getContext('2d');
+    const { context, ratio } = fitCanvas(canvas);
     if (!context) return undefined;
     const { width } = /** @type {{width: number}} */ (engine.selections);
     if (isTinted) return void drawTint(context, selection, width, panes, ratio);
-    const all = distinct(panes).flatMap((pane) => antsOf(selection, width, pane, ratio) ?? []);
+    const all = distinctPanes(panes).flatMap((pane) => antsOf(selection, width, pane, ratio) ?? []);
     let step = 0;
     const draw = () => {
       for (const ants of all) drawAnts(context, ants, step, DASH * ratio);
@@ -50,14 +46,8 @@ export function SelectionOutline({ ui, engine, panes }) {
     return () => clearInterval(timer);
   }, [current?.revision, isTinted, ui.view, places]);
   return html`<canvas class="ants" ref=${ref} hidden=${!current} aria-hidden="true"></canvas>
-    ${draft && html`<${Draft} draft=${draft} panes=${distinct(panes)} />`}`;
+    ${draft && html`<${Draft} draft=${draft} panes=${distinctPanes(panes)} />`}`;
 }
-
-/** Return the panes side by side; of overlapping ones the first. @param {Pane[]} panes */
-const distinct = (panes) =>
-  panes.filter(
-    (pane, k) => panes.findIndex((x) => x.left === pane.left && x.top === pane.top) === k,
-  );
 
 /** A shape that is being drawn.
  * @param {{draft: NonNullable<Ui["selection"]["draft"]>, panes: Pane[]}} props */
@@ -82,7 +72,7 @@ function Draft({ draft, panes }) {
  * @param {number} width of the picture @param {Pane} cssPane @param {number} ratio device pixels for
  * each CSS pixel @returns {Ants | null} */
 function antsOf({ mask, bounds }, width, cssPane, ratio) {
-  const pane = scaled(cssPane, ratio);
+  const pane = devicePane(cssPane, ratio);
   const line = Math.round(ratio);
   const x0 = Math.max(Math.ceil(pane.x), Math.floor(pane.left + bounds[2] * pane.scale) - line);
   const y0 = Math.max(Math.ceil(pane.y), Math.floor(pane.top + bounds[0] * pane.scale) - line);
@@ -114,13 +104,6 @@ function antsOf({ mask, bounds }, width, cssPane, ratio) {
   return { image, x: x0, y: y0, pixels: Int32Array.from(pixels), diagonals: Int32Array.from(diagonals) };
 }
 
-/** In device pixels. @param {Pane} pane @param {number} ratio @returns {Pane} */
-function scaled(pane, ratio) {
-  const { kind, ...lengths } = pane;
-  const entries = Object.entries(lengths).map(([key, value]) => [key, value * ratio]);
-  return { kind, .../** @type {Omit<Pane, 'kind'>} */ (Object.fromEntries(entries)) };
-}
-
 /** @param {CanvasRenderingContext2D} context @param {Ants} ants @param {number} step
  * @param {number} dash in device pixels */
 function drawAnts(context, { image, x, y, pixels, diagonals }, step, dash) {
@@ -134,20 +117,8 @@ function drawAnts(context, { image, x, y, pixels, diagonals }, step, dash) {
  * @param {Pane[]} panes @param {number} ratio */
 function drawTint(context, { mask }, width, panes, ratio) {
   const height = mask.length / width;
-  const tint = document.createElement('canvas');
-  tint.width = width;
-  tint.height = height;
   const image = new ImageData(width, height);
   for (let p = 0; p < mask.length; p += 1)
     image.data.set([...TINT, (TINT_ALPHA * (255 - mask[p])) / 255], 4 * p);
-  tint.getContext('2d')?.putImageData(image, 0, 0);
-  for (const cssPane of panes) {
-    const pane = scaled(cssPane, ratio);
-    context.save();
-    context.beginPath();
-    context.rect(pane.x, pane.y, pane.width, pane.height);
-    context.clip();
-    context.drawImage(tint, pane.left, pane.top, width * pane.scale, height * pane.scale);
-    context.restore();
-  }
+  drawOverPanes(context, image, panes, ratio);
 }

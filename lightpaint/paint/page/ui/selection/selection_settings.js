@@ -2,38 +2,15 @@
 
 import { t } from '../../language/language.js';
 
-/** @typedef {import("../engine_interface.js").Engine} Engine */
-/** @typedef {import("../engine_interface.js").Kind} Kind */
-/** @typedef {import("../ui_state.js").Ui} Ui */
-/** @typedef {import("../ui_state.js").UiStore} UiStore */
-/** @typedef {import("../../engine/selection/mask_operations.js").Mode} Mode */
-/** @typedef {import("../../engine/selection/polygon_mask.js").Corner} Corner */
-/** @typedef {import("../../engine/selection/selections.js").Part} Part */
+/** @import { Engine, Ui, UiStore } from '../ui_state.js' */
+/** @import { Mode } from '../../engine/selection/mask_operations.js' */
 
 /** What a press on the pictures selects.
  * @typedef {"rectangle" | "ellipse" | "lasso" | "object" | "colour"} Shape */
 /** What is selected by numbers, and from lists.
  * @typedef {"rectangle" | "ellipse" | "object" | "light" | "brightness"} TypedKind */
 
-/**
- * @typedef {object} SelectionUi
- * @property {import("../../engine/selection/selections.js").Summary | null} current null while
- *   everything can be painted
- * @property {Shape} shape
- * @property {Mode} mode how a new part joins what is selected
- * @property {number} feather width of a new part's soft edge, in pixels
- * @property {number} tolerance of a selection by colour, in ΔE
- * @property {"ants" | "tint"} show
- * @property {{shape: Shape, corners: Corner[], mode: Mode} | null} draft a shape that is being drawn
- * @property {TypedKind} kind of the panel
- * @property {{x: number, y: number, width: number, height: number}} box
- * @property {string} object name of that in the panel, "" for none
- * @property {string} light
- * @property {"painting" | "solution"} picture whose brightness counts
- * @property {[low: number, high: number]} brightness
- * @property {number} pixels by which the selection grows, shrinks or fades
- * @property {Ui["adjustedArea"]} areaBefore what a drag adjusted before something was selected
- */
+/** @typedef {Ui["selection"]} SelectionUi */
 
 /** @type {{shape: Shape, label: string, icon: string, hint: string}[]} */
 export const SHAPES = [
@@ -49,46 +26,16 @@ export const SHAPES = [
     icon: 'ellipse',
     hint: t('Drag from corner to corner.'),
   },
-  {
-    shape: 'lasso',
-    label: t('Lasso'),
-    icon: 'lasso',
-    hint: t('Drag around what you want.'),
-  },
-  {
-    shape: 'object',
-    label: t('Object'),
-    icon: 'object',
-    hint: t('Click an object.'),
-  },
-  {
-    shape: 'colour',
-    label: t('Colour'),
-    icon: 'wand',
-    hint: t('Click a colour in a picture.'),
-  },
+  { shape: 'lasso', label: t('Lasso'), icon: 'lasso', hint: t('Drag around what you want.') },
+  { shape: 'object', label: t('Object'), icon: 'object', hint: t('Click an object.') },
+  { shape: 'colour', label: t('Colour'), icon: 'wand', hint: t('Click a colour in a picture.') },
 ];
 
 /** @type {{value: Mode, label: string, icon: string, tip: string}[]} */
 export const MODES = [
-  {
-    value: 'replace',
-    label: t('New'),
-    icon: 'join-replace',
-    tip: t('Select only the new part'),
-  },
-  {
-    value: 'add',
-    label: t('Add'),
-    icon: 'join-add',
-    tip: t('Add to the selection (Shift)'),
-  },
-  {
-    value: 'subtract',
-    label: t('Subtract'),
-    icon: 'join-subtract',
-    tip: t('Take from it (Alt)'),
-  },
+  { value: 'replace', label: t('New'), icon: 'join-replace', tip: t('Select only the new part') },
+  { value: 'add', label: t('Add'), icon: 'join-add', tip: t('Add to the selection (Shift)') },
+  { value: 'subtract', label: t('Subtract'), icon: 'join-subtract', tip: t('Take from it (Alt)') },
   {
     value: 'intersect',
     label: t('Intersect'),
@@ -96,27 +43,6 @@ export const MODES = [
     tip: t('Keep what is in both (Shift Alt)'),
   },
 ];
-
-/** @returns {SelectionUi} */
-export function initialSelection() {
-  return {
-    current: null,
-    shape: 'rectangle',
-    mode: 'replace',
-    feather: 0,
-    tolerance: 12,
-    show: 'ants',
-    draft: null,
-    kind: 'rectangle',
-    box: { x: 0, y: 0, width: 100, height: 100 },
-    object: '',
-    light: '',
-    picture: 'painting',
-    brightness: [60, 100],
-    pixels: 8,
-    areaBefore: 'spot',
-  };
-}
 
 /** @param {UiStore} store @param {Partial<SelectionUi>} changes */
 export function updateSelection(store, changes) {
