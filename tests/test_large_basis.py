@@ -17,9 +17,9 @@ from lightpaint.images import denoiser, pixel_blocks
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import pixel_loss
 
-#: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 6.3 GB at
+#: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 4.2 GB at
 #: 3840 x 2160, where libraries and strips of 100 lights take another half.
-BYTES_A_PIXEL = 760
+BYTES_A_PIXEL = 510
 
 
 #: Noise of a light, relative to it, at which blocks of pixels are fitted.
@@ -92,8 +92,9 @@ def test_results_are_those_of_planes_in_memory(
             x for x in expected if isinstance(x, str)
         ]
         floats = ([x for x in some if isinstance(x, float)] for some in (actual, expected))
-        # Sums of the same numbers by bands: round-off, of which solves make a little more.
-        np.testing.assert_allclose(*floats, rtol=1e-8, atol=1e-11)
+        # Sums of the same numbers by bands: round-off, of which solves make a little more, and
+        # differences of noisy blocks thrice as much.
+        np.testing.assert_allclose(*floats, rtol=3e-9 if grain == NOISY else 1e-9, atol=1e-11)
     ends = [(tmp_path / folder / "predicted.exr").read_bytes() for folder in ("file", "memory")]
     assert ends[0] == ends[1]
     sheets = [

@@ -55,8 +55,8 @@ class ErrorEnergies:
         solution: Solution,
         predicted: Floats,
         forbidden: Floats,
-        unreachable_map: Doubles,
-        ignored_map: Doubles,
+        unreachable_map: Floats,
+        ignored_map: Floats,
     ) -> "ErrorEnergies":
         """Sum, band by band, and fill the maps: (h, w, 3) and (h, w)."""
         [target] = solution.problem.views.targets
@@ -98,7 +98,7 @@ def _uncounted(importance: Doubles, image: Floats) -> Doubles:
     return np.where(np.any(image > 0, axis=-1), np.maximum(1 - importance, 0), 0)
 
 
-def grain_power(solution: Solution, unreachable: Doubles) -> float:
+def grain_power(solution: Solution, unreachable: Floats) -> float:
     """Return the power of the painting's noise in the part out of reach.
 
     Grain is measured with the weights of the fit: otherwise a mean would give dark pixels the grain
@@ -225,7 +225,8 @@ def diagnose(solution: Solution) -> Diagnosis:
     predicted, free = basis.predict(weights).image, unbounded_weights(solution)
     # The difference of two mixes, so that both maps add up to the error exactly.
     forbidden = basis.mix(free - weights)
-    unreachable, ignored = np.empty(predicted.shape), np.empty(predicted.shape[:2])
+    unreachable = np.empty(predicted.shape, np.float32)
+    ignored = np.empty(predicted.shape[:2], np.float32)
     energies = ErrorEnergies.of(solution, predicted, forbidden, unreachable, ignored)
     total = energies.total
     out_of_reach = min(energies.out_of_reach, total)

@@ -7,6 +7,7 @@ import pytest
 from nightly import nightly
 
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images import pixel_blocks
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.residuals import (
     PixelGradients,
@@ -155,6 +156,27 @@ def test_a_painting_with_the_noise_of_the_light_steadies_nothing():
     for gain in (1.0, 0.7):
         found = steadier_light(light, half, counted, gain * light)
         np.testing.assert_array_equal(found[0], alone[0])
+
+
+@pytest.mark.parametrize("over", [None, (slice(12), slice(None))], ids=["whole", "over"])
+def test_bands_have_the_gradients_of_whole_pictures(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, over: tuple[slice, slice] | None
+):
+    """To the bit but for the mean light of the painting, which is a sum of bands."""
+    images, halves = _noisy(_pools(), 0.3, 1)
+    basis = make_basis(images=images, half_differences=halves)
+    solution = solve(basis, _painting(_pools(), over), literal=True, space="display")
+    assert not solution.problem.is_linear
+
+    def gradients() -> list[Any]:
+        found = PixelGradients.of(solution, Residuals.of(solution))
+        return [found.mean, found.half, found.bend, found.doubt]
+
+    whole = gradients()
+    monkeypatch.setattr(pixel_blocks, "BAND_PIXELS", 5 * SIZE[1])
+    for banded, expected in zip(gradients(), whole, strict=True):
+        # Differences over a step of 1e-2 magnify the round-off.
+        np.testing.assert_allclose(banded, expected, rtol=1e-10, atol=1e-13)
 
 
 def test_no_tangent_leads_across_the_edge_of_clipping(make_basis: Any):

@@ -23,7 +23,7 @@ gives it the variance 36 σ² and no correlation at a distance: E[a(x) a(x + d)]
 stroke continues there, so these products are subtracted.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.images import box_mean, enlarged
+from lightpaint.images import bands_of, box_mean, enlarged
 from lightpaint.lighting.loss.pixel_loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution
 
@@ -55,6 +55,9 @@ MAX_RATIO, MAX_BLOCK_RATIO = 4.0, 6.0
 #: Pixels on either side whose mean steadies the light of a pixel, and over which its noise and the
 #: change of light are compared.
 BESIDE, WINDOW = 1, 3
+
+#: Rows beside a pixel on which its steadier light depends.
+MARGIN = BESIDE + WINDOW
 
 #: Step of the differences that stand for derivatives, relative to the light of a pixel.
 STEP = 1e-2
@@ -204,64 +207,132 @@ class PixelGradients:
             weight = problem.squares.weight
             D = weight.reshape(-1, weight.shape[2]).astype(np.float64)
             return cls(D * residuals.residual(everything), -D * residuals.noise(everything))
-        pixels, look = problem.loss.pixels, None
-        light = _Steadied.of(solution, residuals.predicted, residuals.half, pixels.guide)
+        everywhere, counted = problem.loss.pixels, (solution.importance > 0).reshape(-1, 1)
+        light, look = (residuals.predicted, residuals.half), None
         if residuals.current is not None:
-            shown = solution.basis.current_look.reshape(-1, 3)
-            look = _Steadied.of(solution, shown, residuals.current)
-        mean, half, bend, doubt = np.empty((4, *light.steady.shape))
+            look = solution.basis.current_look.reshape(-1, 3), residuals.current
+        results = np.zeros((4, 3, len(everywhere)))
+        for bands in _bands_of_views(solution):
+            dark = _dark_light(
+                (everywhere.subset(band.own).guide, counted[band.own]) for band in bands
+            )
+            for band in bands:
+                pixels = everywhere if len(bands) == 1 else everywhere.subset(band.own)
+                guide = everywhere.subset(band.around).guide
+                own_light = band.steadied(*light, counted, guide, dark)
+                own_look = None if look is None else band.steadied(*look, counted)
+                _fill_gradients(results[..., band.own], pixels, own_light, own_look)
+        mean, half, bend, doubt = (x.T for x in results)
+        return cls(mean, half, bend, doubt)
 
-        def fill(strip: slice, part: PixelLoss) -> None:
-            own = light.part(strip).within_clipping(part)
-            tangent = _Tangent(part, own, None if look is None else look.part(strip))
-            whole = _gradient(part, planes_of(residuals.predicted[strip]))
-            start, left = tangent.start(), [x.noise_left for x in tangent.pictures]
-            mean[:, strip] = start + tangent.along([x.distance for x in tangent.pictures])
-            half[:, strip] = tangent.along([x.noise for x in tangent.pictures])
-            bend[:, strip] = whole - mean[:, strip]
-            ends = [tangent.at([sign * x for x in left]) for sign in (1, -1)]
-            doubt[:, strip] = (ends[0] + ends[1]) / 2 - start
 
-        pixels.map_strips(fill)
-        return cls(mean.T, half.T, bend.T, doubt.T)
+def _fill_gradients(
+    results: Doubles, pixels: PixelLoss, light: "_Steadied", look: "_Steadied | None"
+) -> None:
+    """Fill in mean, half, bend and doubt of some pixels, (4, 3, p)."""
+    mean, half, bend, doubt = results
+
+    def fill(strip: slice, part: PixelLoss) -> None:
+        own = light.part(strip).within_clipping(part)
+        tangent = _Tangent(part, own, None if look is None else look.part(strip))
+        whole = _gradient(part, light.picture[:, strip])
+        start, left = tangent.start(), [x.noise_left for x in tangent.pictures]
+        mean[:, strip] = start + tangent.along([x.distance for x in tangent.pictures])
+        half[:, strip] = tangent.along([x.noise for x in tangent.pictures])
+        bend[:, strip] = whole - mean[:, strip]
+        ends = [tangent.at([sign * x for x in left]) for sign in (1, -1)]
+        doubt[:, strip] = (ends[0] + ends[1]) / 2 - start
+
+    pixels.map_strips(fill)
+
+
+@dataclass(frozen=True)
+class _Band:
+    """Rows of a view, as pixels of the long picture of all views.
+
+    own: their pixels. around: these, and the rows beside them that their steadier light depends on.
+    rows: the own ones of these rows. width: pixels in a row.
+    """
+
+    own: slice
+    around: slice
+    rows: slice
+    width: int
+
+    def steadied(
+        self,
+        light: Floats,
+        noise: Floats,
+        counted: Bools,
+        guide: Floats | None = None,
+        dark: float = 0.0,
+    ) -> "_Steadied":
+        """Steady the rows of a picture. light: (p, 3); noise: (p, 3), its half differences;
+        counted: (p, 1); all of the long picture. guide: (3, around), as in `PixelLoss`.
+        """
+        pictures = [x[self.around] for x in (light, noise, counted)]
+        if guide is not None:
+            pictures.append(guide.T)
+        images = (x.reshape(-1, self.width, x.shape[1]).astype(np.float64) for x in pictures)
+        steady, share = (planes_of(x[self.rows]) for x in steadier_light(*images, dark=dark))
+        picture, own = planes_of(light[self.own]), planes_of(noise[self.own])
+        return _Steadied(picture, steady, own, np.sqrt(1 - np.square(share)) * own)
+
+
+def _bands_of_views(solution: Solution) -> Iterator[list[_Band]]:
+    """Yield the bands of each view."""
+    views, first = solution.problem.views, 0
+    sizes = [basis.size for basis in views.bases]
+    for height, width in sizes if len(sizes) > 1 else [solution.importance.shape]:
+        bands = []
+        for rows in bands_of((height, width)):
+            top, bottom = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
+            own, around = (
+                slice(first + width * a, first + width * b)
+                for a, b in ((rows.start, rows.stop), (top, bottom))
+            )
+            bands.append(_Band(own, around, slice(rows.start - top, rows.stop - top), width))
+        yield bands
+        first += height * width
+
+
+def _dark_light(guides: Iterable[tuple[Floats | None, Bools]]) -> float:
+    """Return the light of a guide below which a ratio to it says little.
+
+    guides: of bands of a view, (3, p), and which of their pixels count, (p, 1).
+    """
+    light = count = 0.0
+    for guide, counted in guides:
+        if guide is None:
+            return 0.0
+        guided = counted[:, 0] & (guide > 0).any(axis=0)
+        light += float(np.sum(np.maximum(guide, 0) * guided, dtype=np.float64))
+        count += 3 * int(guided.sum())
+    return DARK * light / max(count, 1)
 
 
 @dataclass(frozen=True)
 class _Steadied:
     """A picture and its steadier light, (3, p) each.
 
-    steady: the steadier light. distance: of the picture from it. noise: half differences of the
-    picture. noise_left: the half differences of the light between both that the steadier light does
-    not average.
+    picture: its light. steady: the steadier light. noise: half differences of the picture.
+    noise_left: the half differences of the light between both that the steadier light does not
+    average.
     """
 
+    picture: Doubles
     steady: Doubles
-    distance: Doubles
     noise: Doubles
     noise_left: Doubles
 
-    @classmethod
-    def of(
-        cls, solution: Solution, light: Floats, noise: Floats, guide: Floats | None = None
-    ) -> "_Steadied":
-        """Steady a picture of all views. light: (p, 3); noise: (p, 3), its half differences. guide:
-        (3, p), as in `PixelLoss`.
-        """
-        views, size = solution.problem.views, solution.importance.shape
-        counted = (solution.importance > 0).astype(np.float64)[..., None]
-        pictures = [light.reshape(*size, 3), noise.reshape(*size, 3), counted]
-        if guide is not None:
-            pictures.append(guide.T.reshape(*size, 3))
-        parts = []
-        for k in range(len(views)):
-            parts.append(steadier_light(*(views.part(x, k).astype(np.float64) for x in pictures)))
-        steady, share = (planes_of(views.join(x)) for x in zip(*parts, strict=True))
-        own = planes_of(noise)
-        return cls(steady, planes_of(light) - steady, own, np.sqrt(1 - np.square(share)) * own)
+    @property
+    def distance(self) -> Doubles:
+        """Of the picture from the steadier light, (3, p)."""
+        return self.picture - self.steady
 
     def part(self, strip: slice) -> "_Steadied":
         """Return the same of some pixels."""
-        everything = (self.steady, self.distance, self.noise, self.noise_left)
+        everything = (self.picture, self.steady, self.noise, self.noise_left)
         return _Steadied(*(x[:, strip] for x in everything))
 
     def within_clipping(self, pixels: PixelLoss) -> "_Steadied":
@@ -276,8 +347,8 @@ class _Steadied:
         )
         stays = np.logical_or.reduce([x != was_flat for x in are_flat])
         return _Steadied(
+            light,
             np.where(stays, light, self.steady),
-            np.where(stays, 0, self.distance),
             self.noise,
             np.where(stays, self.noise, self.noise_left),
         )
@@ -324,7 +395,12 @@ def _gradient(pixels: PixelLoss, light: Doubles) -> Doubles:
 
 
 def steadier_light(
-    light: Doubles, noise: Doubles, counted: Doubles, guide: Doubles | None = None
+    light: Doubles,
+    noise: Doubles,
+    counted: Doubles,
+    guide: Doubles | None = None,
+    *,
+    dark: float = 0.0,
 ) -> tuple[Doubles, Doubles]:
     """Return light moved towards the mean of its neighbours as far as only noise differs there,
     and the share of the way that it moves, (h, w, 3) each.
@@ -335,7 +411,7 @@ def steadier_light(
 
     light, noise: (h, w, 3), an image and its half differences. counted: (h, w, 1), 1 for pixels
     that count as neighbours, else 0. guide: (h, w, 3), a picture without noise of what the light
-    shows; 0 where it is unknown.
+    shows; 0 where it is unknown. dark: light of the guide below which a ratio to it says little.
     """
     steady, share = np.empty_like(light), np.empty_like(light)
     around = _Neighbours.of(counted[..., 0])
@@ -345,10 +421,9 @@ def steadier_light(
         return steady, share
     guided = counted * (guide > 0).any(axis=-1, keepdims=True)
     shown = np.maximum(guide, 0)
-    floor = DARK * (shown * guided).sum() / max(3 * guided.sum(), 1)
     around, is_guided = _Neighbours.of(guided[..., 0]), guided[..., 0] > 0
     for c in range(3):
-        unit = np.where(is_guided, shown[..., c] + floor, 1)
+        unit = np.where(is_guided, shown[..., c] + dark, 1)
         ratio, of_ratio, change = _steadied(light[..., c] / unit, noise[..., c] / unit, around)
         is_better = is_guided & (of_ratio > share[..., c]) & (change >= MIN_INDEPENDENT)
         steady[is_better, c] = (ratio * unit)[is_better]
