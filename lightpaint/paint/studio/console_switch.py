@@ -86,7 +86,7 @@ class ConsoleSwitch:
         """
         if self.console is None or self.console.open_link is None:
             raise PaintError(
-                "there is no console to send to: start the painter with --rig and --to"
+                "there is no console to send to: start the painter with a rig and an address"
             )
         match message:
             case SwitchConsole(is_on):
