@@ -62,6 +62,10 @@ RELEASE_CLAUSES = {
     "lock": ("locked; adjusting it", "locked; adjusting them"),
     "limits": ("at a limit; removing it", "at their limits; removing them"),
     "colour": ("limited in colour; any other colour", "limited in colour; other colours"),
+    "emitters": (
+        "at the limits of its emitters; stronger or other ones",
+        "at the limits of their emitters; stronger or other ones",
+    ),
     "tie": (
         "tied to other lights; adjusting it by itself",
         "tied together; adjusting each by itself",
@@ -336,7 +340,8 @@ def _spoken_error(solved: float, low: float, high: float) -> str:
     below, above = (spoken_percent(float(side / solved)) for side in sides)
     if below == above:
         return f"± {below}"
-    return f"{f'−{below}' if low < solved else '0'} … {f'+{above}' if high > solved else '0'}"
+    none = spoken_percent(0)
+    return f"{'0' if below == none else f'−{below}'} … {'0' if above == none else f'+{above}'}"
 
 
 def partly_reached(lighting: Lighting) -> list[str]:

@@ -154,7 +154,7 @@ def spoken_difference(
 
 def spoken_percent(share: float) -> str:
     """Return `0.4 %`, `7 %`, `62 %`."""
-    return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"
+    return f"{100 * share:.1f} %" if 0.0005 <= share < 0.0095 else f"{100 * share:.0f} %"
 
 
 def spoken_drives(drives: Mapping[str, float]) -> str:

@@ -23,6 +23,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "lock": ("{} is locked", "{} are locked"),
     "limits": ("{} is at a limit", "{} are at their limits"),
     "colour": ("the colour of {} is limited", "the colours of {} are limited"),
+    "emitters": ("the emitters of {} are at their limits",) * 2,
     "tie": ("{} is tied to other lights", "{} are tied together"),
     "sparse": ("the number of lights is limited",) * 2,
     "prefer_current": ("lights are pulled towards their current setting",) * 2,

@@ -42,14 +42,23 @@ OWN_COLOR_LABEL = "own colour"
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
 ConstraintKind = Literal[
-    "off", "lock", "limits", "colour", "tie", "sparse", "prefer_current", "near", "planes"
+    "off",
+    "lock",
+    "limits",
+    "colour",
+    "emitters",
+    "tie",
+    "sparse",
+    "prefer_current",
+    "near",
+    "planes",
 ]
 
 #: The constraints on all lights together.
 ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near", "planes")
 
 #: Kinds of constraints on single lights.
-SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
+SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour", "emitters")
 
 #: The keys of a lights file for each of them.
 KEYS_BY_KIND: Mapping[str, tuple[str, ...]] = {
@@ -57,6 +66,7 @@ KEYS_BY_KIND: Mapping[str, tuple[str, ...]] = {
     "lock": ("lock",),
     "limits": ("limits",),
     "colour": (*constraint_table.COLOR_KEYS, "duv"),
+    "emitters": ("rf", *constraint_table.LAMP_KEYS),
 }
 
 

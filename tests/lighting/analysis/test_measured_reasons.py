@@ -64,13 +64,18 @@ def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("kind", ["limits", "colors"])
+@pytest.mark.parametrize("kind", ["limits", "colors", "emitters"])
 def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str):
     basis, target = studio
     limits = Constraints.of({"left": {"limits": {"max": 0.12}}})
+    lamp = {"emitters": [{"name": "white", "rgb": [1, 1, 1], "Y": 0.1}]}
     options, free = {
         "limits": ({"constraints": limits, "colors": "free"}, {"colors": "free"}),
         "colors": ({"colors": "white"}, {"colors": "free"}),
+        "emitters": (
+            {"constraints": Constraints.of({"left": lamp}), "colors": "free"},
+            {"colors": "free"},
+        ),
     }[kind]
     before = correct_noise(solve(basis, target, hold=0.01, **options))
     reason = compare_appearance(before).reasons[0]

@@ -229,7 +229,8 @@ def _constrained(problem: Problem) -> Bools:
     constraints, lights = problem.constraints, problem.lights
     is_constrained = np.array([light.is_fixed for light in lights], dtype=bool)
     kinds = ConstraintsByLight.of(constraints, lights).kinds()
-    for kind in (*SINGLE_LIGHT_KINDS, "tie", "sparse"):
+    # Emitters can be off, as lights without them can.
+    for kind in {*SINGLE_LIGHT_KINDS, "tie", "sparse"} - {"emitters"}:
         is_constrained[list(kinds.get(kind, ()))] = True
     return is_constrained
 

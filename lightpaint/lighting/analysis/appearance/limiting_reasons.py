@@ -280,12 +280,10 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
     reasons: list[Reason] = []
     for kind in order:
         if kind == "constraints":
-            reasons += [
-                Reason(
-                    constraint, sample.light_names(constraint, lights), everything, is_joint=True
-                )
-                for constraint, lights in sample.by_light.kinds().items()
-            ]
+            for constraint, lights in sample.by_light.kinds().items():
+                limited = [k for k in lights if k in sample.limited] or lights
+                names = sample.light_names(constraint, limited)
+                reasons.append(Reason(constraint, names, everything, is_joint=True))
         else:
             names = sample.limiting_views(kind)
             reasons.append(Reason(kind, names, everything, is_joint=True))

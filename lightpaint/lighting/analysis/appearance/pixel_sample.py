@@ -59,7 +59,7 @@ class PixelSample:
     """A sample of the pixels of all views, each view in one row.
 
     problem: of all pixels of all views. view_index: of the analysed view. names: of the views.
-    weights: (n, 3), the answer.
+    weights: (n, 3), the answer. limited: indices of the lights whose own constraints limit it.
     """
 
     problem: Problem
@@ -69,6 +69,7 @@ class PixelSample:
     names: tuple[str, ...]
     look: PaintComparison
     weights: Doubles
+    limited: frozenset[int]
     _shares: dict[tuple[frozenset[LimitGroup], tuple[int, ...]], float] = field(
         default_factory=dict
     )
@@ -114,6 +115,7 @@ class PixelSample:
             sensors if len(set(sensors)) == len(sensors) else names,
             look,
             solution.weights,
+            frozenset(k for k, x in enumerate(solution.lighting.lights) if x.is_active),
         )
 
     @property
