@@ -15,7 +15,9 @@ with a prime, take it out. A brush, too, may leave residuals that resemble h, bu
 small part of them.
 
 Where h explains most, the painting is replaced by Ψ − α h, which is what a box filter would show,
-and the answer to that is found. It has another h, so this is done a few times.
+and the answer to that is found. It has another h, so this is done a few times. Mitsuba's other
+filters are narrower, and nearly a part α of the Gaussian: tent and Mitchell about half of it. So no
+kernel has to be known, and a painting says nothing of the film of the scene that it is used with.
 """
 
 import math
@@ -41,9 +43,9 @@ TAP = (1 - math.erf(math.sqrt(0.5))) / 2
 #: Least share of the residual beside noise that the filter of a render explains.
 MIN_EXPLAINED = 0.8
 
-#: Least part of the squared residual that is not grain. In light that changes from pixel to pixel,
-#: a brush, or paint that ends at white, may leave as much as a filter.
-MIN_STRUCTURED = 0.5
+#: Least correlation of h with the residual, whose grain counts: a painting in 8 bits is rounded. A
+#: brush may leave as much beside grain, in light that changes from pixel to pixel, but not this.
+MIN_CORRELATION = 0.5
 
 #: Standard errors beyond which noise does not make Σ D h r.
 SURE = 8.0
@@ -125,7 +127,7 @@ def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, F
     product, power = _dot(D, h, missed), _dot(D, h, h)
     squares = _dot(D, missed, missed)
     lacking = squares - float(grain.sum())
-    if lacking < MIN_STRUCTURED * squares:
+    if product < MIN_CORRELATION * math.sqrt(max(power * squares, 0)):
         return None
     spread = float((D * np.square(h.image) * (grain + D * np.square(missed.half))).sum())
     # A share of at most 1 explains at most this much.
