@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         BLOCK_PIXELS, FEW_LIGHTS, IndirectLight, LitEntries, MemoryPlanes, Planes, Rooms, as_planes,
         as_slice, block_of, blocks_of, joined_planes, mix_channels, thinned,
     )
+    from lightpaint.basis.working_primaries import multipliers_in
     # fmt: on
 
 if not TYPE_CHECKING:  # a type checker would take any name

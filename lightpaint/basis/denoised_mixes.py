@@ -65,7 +65,7 @@ def denoise_mixes(
     weights: (n, 3) each. For the others see `denoise_mix`.
     """
     together = np.array(weights)
-    sets = [basis.planes.mixes(together) if mixed is None else mixed]
+    sets = [basis.mixes(together) if mixed is None else mixed]
     if (parts := basis.indirect) is not None:
         sets += [x.mixes(together) for x in (basis.noise, parts.planes, parts.noise)]
     return [

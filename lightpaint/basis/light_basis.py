@@ -11,6 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.plane_results import array_name, array_once, forget_results
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes, relative_variances
+from lightpaint.basis.working_primaries import check_primaries, mixes_in, response_in
 from lightpaint.colour import choose_exposure, luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
@@ -24,8 +25,9 @@ from lightpaint.version import __version__
 #: Maximum number of samples per pixel, beyond the number of any render.
 MAX_SAMPLES = 2**40
 
-#: Prefix of the method of light groups, before the name of the renderer.
-LIGHT_GROUPS = "light groups of "
+#: Prefix of the method of light groups, before the name of the renderer; and the plugin of the
+#: light that holds what these lack of the whole picture.
+LIGHT_GROUPS, REST = "light groups of ", "rest"
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class Origin:
     extra_spp: mean number of additional samples per pixel where a painting needed them (see
     `Basis.extra`).
     observer: what sees it, of a basis with spectra; "" for RGB.
+    primaries: CIE xy of red, green, blue and white of the primaries in which the renderer of light
+    groups multiplies lights, if they are not those of Rec.709; see `Basis.mix`.
     """
 
     scene: str
@@ -58,6 +62,7 @@ class Origin:
     is_composed: bool = False
     extra_spp: float = 0.0
     observer: str = ""
+    primaries: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.extra_spp <= MAX_SAMPLES:
@@ -67,6 +72,8 @@ class Origin:
             > MAX_SAMPLES
         ):
             raise BasisError(f"{self.halves} samples are more than any render has")
+        if self.primaries:
+            check_primaries(self.primaries)
 
     @property
     def spp(self) -> int:
@@ -384,12 +391,48 @@ class Basis(Shown):
         vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return the image Σ w_i Φ_i, (h, w, 3) float32.
+        """Return the image Σ w_i Φ_i, (h, w, 3) float32; of light groups whose renderer multiplies
+        in other primaries, what that shows (see `working_primaries.py`).
 
         weights: (n, 3), as lights are ordered, finite. Raises BasisError for others.
         """
         self._check_weights(weights)
-        return self.planes.mix(weights)
+        return np.asarray(self.mixes(np.asarray(weights)[None])[0])
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several mixes, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        if self.origin.primaries:
+            return mixes_in(self.origin.primaries, self.planes, weights)
+        return self.planes.mixes(weights)
+
+    @property
+    def can_be_multiplied(self) -> bool:
+        """True if its renderer multiplies lights in other primaries than Rec.709."""
+        return bool(self.origin.primaries) and any(light.plugin == REST for light in self.lights)
+
+    def channel_responses(self) -> Planes:
+        """Return planes that say what a change of a single channel changes in this channel; of the
+        lights that stay those as they are. See `as_multiplied`.
+        """
+        adjusted = [k for k, light in enumerate(self.lights) if not light.is_fixed]
+        planes = {k: response_in(self.origin.primaries, self.planes.plane(k)) for k in adjusted}
+        return self.planes.replaced(planes)
+
+    def as_multiplied(self, weights: Doubles, planes: Planes | None = None) -> "Basis":
+        """Return a basis whose planes add up to `mix` at some weights, (n, 3): what multiplying in
+        the renderer's primaries changes there is in its `rest`. Its current look stays.
+
+        planes: other planes of the lights, such as `channel_responses`.
+        """
+        planes = self.planes if planes is None else planes
+        rest = next(k for k, light in enumerate(self.lights) if light.plugin == REST)
+        change = self.mix(weights) - planes.mix(weights)
+        return replace(
+            self,
+            planes=planes.replaced({rest: planes.plane(rest) + change}),
+            origin=replace(self.origin, primaries=()),
+            former=Estimate(self.current_look, self.current_noise),
+        )
 
     def _check_weights(self, weights: Doubles) -> None:
         """Raise BasisError unless there are three finite weights for each light."""

@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.live.live_solver import LiveSolver
     from lightpaint.lighting.live.live_view import LiveView
     from lightpaint.lighting.loss.painting import ignored_paint, resolve_importance
+    from lightpaint.lighting.multiplied_answer import answer_as_multiplied
     from lightpaint.lighting.normal_equations import NormalEquations
     from lightpaint.lighting.problem import Problem
     from lightpaint.lighting.solution import Solution

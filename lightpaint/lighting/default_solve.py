@@ -17,6 +17,7 @@ from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.multiplied_answer import answer_as_multiplied
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import choose_mixes, solution_of
@@ -83,4 +84,9 @@ def default_answer(
 
     finish: what is done to each answer once it is solved, as the correction of its noise.
     """
-    return hold_to_current(answer_without_filter(finish(solution_of(problem)), finish), finish)
+
+    def finish_multiplied(solution: Solution) -> Solution:
+        return answer_as_multiplied(finish(solution), finish)
+
+    solution = answer_without_filter(finish_multiplied(solution_of(problem)), finish)
+    return hold_to_current(solution, finish_multiplied)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis import Basis, Lights
+from lightpaint.basis import Basis, Lights, Planes
 from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
@@ -132,6 +132,8 @@ class Problem(linear_problem.LinearProblem):
         tether: A further pull on the weights, to those at other frames of a shot; None without.
         holding: The pull to the current lights that holds an answer which would lead away from the
             paint; None without.
+        given: The bases of the views of light groups whose renderer multiplies in other primaries,
+            where those of the problem add up to its picture at one lighting; () for others.
         filter_share: The share of a Gaussian reconstruction filter whose effect was taken out of
             the paintings, which are renders; 0 without one.
 
@@ -161,6 +163,7 @@ class Problem(linear_problem.LinearProblem):
     tether: NormalEquations | None = None
     holding: NormalEquations | None = None
     filter_share: float = 0.0
+    given: tuple[Basis, ...] = ()
 
     __repr__ = short_repr
 
@@ -299,6 +302,36 @@ class Problem(linear_problem.LinearProblem):
         squares, loss = _losses(views, self.basis, self.fit)
         equations = NormalEquations.of(self.basis, squares.image, squares.weight)
         return replace(self, views=views, squares=squares, loss=loss, equations=equations)
+
+    def as_multiplied(self, weights: Doubles, planes: Sequence[Planes] | None = None) -> "Problem":
+        """Return this problem, before a solve, on planes that add up to the render at weights (n,
+        3); see `Basis.as_multiplied`. planes: of each view.
+        """
+        bases, planes = self.views.bases, planes or [x.planes for x in self.views.bases]
+        multiplied = [x.as_multiplied(weights, y) for x, y in zip(bases, planes, strict=True)]
+        return replace(self._with_bases(multiplied), given=bases)
+
+    def as_given(self) -> "Problem":
+        """Return this problem before `as_multiplied`, and before a solve."""
+        return replace(self._with_bases(self.given), given=()) if self.given else self
+
+    def _with_bases(self, bases: Sequence[Basis]) -> "Problem":
+        """Return the same demands on other planes of the same lights. bases: of each view."""
+        whole, parts = joint_basis(bases)
+        views = Views(parts, self.views.targets)
+        squares, loss = _losses(views, whole, self.fit)
+        equations = NormalEquations.of(whole, squares.image, squares.weight)
+        return replace(
+            self,
+            basis=whole,
+            views=views,
+            squares=squares,
+            loss=loss,
+            equations=equations,
+            reduction=self.full,
+            corrected=None,
+            noise_removed=0.0,
+        )
 
     def view_problem(self, k: int) -> "Problem":
         """Return the problem of view k alone: its pixels of the same squares."""

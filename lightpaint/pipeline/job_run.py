@@ -20,6 +20,7 @@ from lightpaint.lighting import (
     Solution,
     SurfaceColor,
     analyse,
+    answer_as_multiplied,
     answer_without_filter,
     choose_mixes,
     default_answer,
@@ -184,8 +185,10 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     )
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
         solution = job_bases.without_noise(job, solution)
-    solution = _without_filter(job, solution, listen)
-    held = hold_to_current(solution, partial(job_bases.without_noise, job))
+    solution = _without_filter(job, answer_as_multiplied(solution), listen)
+    held = hold_to_current(
+        solution, lambda x: answer_as_multiplied(job_bases.without_noise(job, x))
+    )
     if held is not solution:
         listen.say(
             Sentence(

@@ -145,7 +145,17 @@ def _layer(
         listen.say(
             f"{stage_name} hides {some_names(overridden.in_part)}, or links it to some prims alone"
         )
+    _say_spaces(overridden.unknown_spaces, source.stage, listen)
     return overridden.text
+
+
+def _say_spaces(names: Sequence[str], stage: Path | None, listen: Listener) -> None:
+    """Say which colour spaces of a stage are unknown, if any are."""
+    if names:
+        listen.say(
+            f"{stage} has colours of lights in {some_names(names)}, a colour space that USD does "
+            "not know: the layer has linear Rec.709"
+        )
 
 
 def _layer_of_groups(export: exported_answer.ExportContext) -> str:
@@ -158,6 +168,7 @@ def _layer_of_groups(export: exported_answer.ExportContext) -> str:
         source.stage,
         export.folder,
         by_frame={frame: _free_weights(lit) for frame, lit in lighting.by_frame.items()},
+        primaries=source.light_groups.basis.origin.primaries,
         about=f"lightpaint: lights of {source.light_groups.name} as solved for {lighting.target}",
     )
     if overridden.left:
@@ -165,6 +176,7 @@ def _layer_of_groups(export: exported_answer.ExportContext) -> str:
             f"{source.stage} has no light with the path, tag or name "
             f"{some_names(overridden.left)}, or it is animated: set it by hand"
         )
+    _say_spaces(overridden.unknown_spaces, source.stage, export.listen)
     return overridden.text
 
 

@@ -23,6 +23,7 @@ from lightpaint.blender_addon.lamps.lamp_levels import (
 )
 from lightpaint.blender_addon.lamps.lamp_units import (
     are_equal,
+    in_space,
     scaled,
     scaled_colour,
     working_space,
@@ -67,20 +68,20 @@ def test_a_change_of_brightness_alone_leaves_the_colour() -> None:
     ("name", "primaries"), [("lin_ap1_scene", ACESCG), ("lin_rec2020_scene", REC2020)]
 )
 @given(factor=FACTORS)
-def test_multipliers_are_of_rec709_whatever_space_a_file_works_in(
+def test_a_white_light_becomes_the_colour_of_rec709_whatever_space_a_file_works_in(
     name: str, primaries: tuple[float, ...], factor: tuple[float, ...]
 ) -> None:
     settings = SimpleNamespace(working_space_interop_id=name)
     space = working_space(SimpleNamespace(colorspace=settings))
     assert space is not None
     np.testing.assert_allclose(space, from_rec709(primaries), atol=1e-9)  # nine digits
-    shown = np.array([1.0, 0.5, 0.25])
-    level, *colour = scaled([80.0, *(np.array(space) @ shown)], factor, space)
+    level, *colour = scaled([80.0, 1.0, 1.0, 1.0], in_space(factor, space))
     made = level * np.linalg.solve(space, colour)
-    np.testing.assert_allclose(made, 80.0 * shown * factor, rtol=1e-9, atol=1e-9 * max(factor))
-    assert working_space(SimpleNamespace()) is None  # before Blender 5
-    # A colour outside of the gamut of Rec.709 may not become negative.
-    assert min(scaled_colour([1.0, 0.0, 1.0, 0.0], factor, space)) >= 0
+    np.testing.assert_allclose(made, 80.0 * np.array(factor), atol=1e-9 * 80 * max(factor))
+    # Another light is multiplied channel by channel there, as a renderer multiplies it.
+    level, *other = scaled([80.0, 0.5, 0.0, 1.0], in_space(factor, space))
+    np.testing.assert_allclose(other, np.array(colour) * (0.5, 0.0, 1.0), rtol=1e-9)
+    assert in_space(factor, working_space(SimpleNamespace())) == factor  # before Blender 5
 
 
 def test_levels_are_compared_as_float32() -> None:

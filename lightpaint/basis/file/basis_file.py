@@ -116,7 +116,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         ('panel', 'bulb')
     """
     # Newer fields are left out at their defaults, as in files that are older than these fields.
-    later = ("each_light", "integrator", "is_composed", "extra_spp", "observer")
+    later = ("each_light", "integrator", "is_composed", "extra_spp", "observer", "primaries")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
     others, sums, has_lit_parts = list(other_parts(basis)), dict[str, str](), list[bool]()
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.light_basis import LIGHT_GROUPS, Basis, Origin
+from lightpaint.basis.light_basis import LIGHT_GROUPS, REST, Basis, Origin
 from lightpaint.basis.lightgroups import beauty_comparison
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
@@ -26,6 +26,7 @@ from lightpaint.basis.lightgroups.naming_conventions import convention_of
 from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
+from lightpaint.basis.working_primaries import name_of_primaries, working_primaries
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import BasisError
@@ -134,6 +135,19 @@ def read_light_groups(
     return _light_groups(path, roles_of(path, candidates, pattern), passes, read)
 
 
+def _remark_on_primaries(primaries: tuple[float, ...]) -> str:
+    """Return a sentence on a file whose primaries are not those of Rec.709."""
+    worked_in = working_primaries(primaries)
+    if not worked_in:
+        return (
+            "the file has other primaries than Rec.709, in which no renderer is known to work: "
+            "multipliers are for linear Rec.709"
+        )
+    name, own = name_of_primaries(primaries), name_of_primaries(worked_in)
+    place = "it" if name == own else own
+    return f"the file is linear {name}: lights are multiplied in {place}, as its renderer does"
+
+
 def _check_light(
     path: Path, lights: Mapping[str, RenderLayer], holes: npt.NDArray[np.bool_]
 ) -> None:
@@ -176,10 +190,7 @@ def _light_groups(
     remarks = [*render.remarks, remark, *roles.remarks, missing.remark]
     remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
-        remarks.append(
-            "the file has other primaries than Rec.709: multipliers are for linear Rec.709, so a "
-            "renderer that works in other primaries reproduces them only approximately"
-        )
+        remarks.append(_remark_on_primaries(lights[0].primaries))
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     basis = _basis(path, roles, passes, missing.rest, holes)
@@ -211,13 +222,16 @@ def _basis(
     lights = roles.lights
     basis_lights = [_light(name, layer.name, "light group") for name, layer in lights.items()]
     height, width = holes.shape
-    images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
+    # What other primaries change is added to the rest.
+    primaries = working_primaries(first.primaries)
+    has_rest = rest is not None or bool(primaries)
+    images = np.empty((len(lights) + has_rest, height, width, 3), np.float32)
     for image, layer in zip(images, lights.values(), strict=False):
         image[:] = layer.in_rec709(_without_holes(layer.image, holes))
-    if rest is not None:
+    if has_rest:
         basis_lights.append(_rest_light(lights))
-        images[-1] = first.in_rec709(rest)
+        images[-1] = 0.0 if rest is None else first.in_rec709(rest)
     unknown_noise = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
     return Basis(
@@ -225,7 +239,7 @@ def _basis(
         planes=as_planes(images),
         noise=unknown_noise,
         emitters_seen=np.zeros(holes.shape, dtype=bool),
-        origin=_origin(path, roles, images, [*lights]),
+        origin=replace(_origin(path, roles, images, [*lights]), primaries=primaries),
         features=passes.features(roles.view),
         indirect=None if indirect is None else IndirectLight(as_planes(indirect), unknown_noise),
     )
@@ -250,7 +264,7 @@ def _indirect_planes(
 def _rest_light(names: Collection[str]) -> BasisLight:
     """Return the light that holds what the lights of these names lack of the beauty."""
     name = free_name(REST_NAME, names)
-    return _light(name, "beauty less the groups", "rest", is_fixed=True)
+    return _light(name, "beauty less the groups", REST, is_fixed=True)
 
 
 def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> BasisLight:

@@ -22,6 +22,7 @@ from lightpaint.lighting import (
     Lighting,
     Problem,
     Sums,
+    answer_as_multiplied,
     read_lighting,
     solution_of,
     solve_squares,
@@ -253,7 +254,7 @@ def _answer_by_sums(job: pipeline.Job, basis: Basis) -> None:
     if not basis.knows_noise:
         # Only pixels show which differences are rounding alone (see lighting/problem.py).
         problem = Problem.of(basis, view.target, constraints=job.all_constraints, fit=job.fit)
-        _publish_lighting_only(job, solution_of(problem).lighting)
+        _publish_lighting_only(job, answer_as_multiplied(solution_of(problem)).lighting)
         return
     sums = sum_rows(basis, view.target, slice(None), job.fit)
     origin = basis.origin

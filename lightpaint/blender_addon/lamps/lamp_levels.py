@@ -10,7 +10,7 @@ material or world of a light group whose lamp has emitters in the lights file ca
 custom property, {"red": 0.4, "white": 1.0}, beside the levels that they give.
 """
 
-from .lamp_units import are_equal
+from .lamp_units import are_equal, in_space
 from .lit_items import (
     KEYED,
     LampEmission,
@@ -119,7 +119,7 @@ def show_factors(groups, factors, space=None):
             values = place.values()
             if not are_equal(values, slot["last"]):  # changed by hand since
                 slot["kept"] = values
-            wanted = place.scaled(slot["base"], factors[name], space)
+            wanted = place.scaled(slot["base"], in_space(factors[name], space))
             if not are_equal(values, wanted):
                 place.assign(wanted)
                 changed += 1

@@ -4,8 +4,8 @@
 Power in watts (point, spot, area), irradiance (sun) and strength (world, emission) are all
 proportional to the light that arrives, so one rule serves them.
 
-Multipliers are of linear Rec.709, as lightpaint shows and solves everything. A file has its colours
-in a working space, which from Blender 5 on may have other primaries.
+Multipliers are colours of linear Rec.709: what a white light becomes. A file works in a space of
+its own, which from Blender 5 on may have other primaries, and there each channel is multiplied.
 """
 
 import math
@@ -32,27 +32,26 @@ SPACES = {
 }
 
 
-def scaled(base, factor, space=None, tint=None):
-    """Return [level, red, green, blue] multiplied by a factor for each channel of Rec.709.
+def scaled(base, factor):
+    """Return [level, red, green, blue] multiplied by a factor for each channel.
 
     The level takes the factor's mean and the colour the rest, so that a change of brightness alone
-    leaves the colour as it is. A light that goes out keeps its colour. space: as
-    `working_space` returns it. tint: what else multiplies the colour, in that space.
+    leaves the colour as it is. A light that goes out keeps its colour.
     """
     level, *colour = base
     mean = sum(factor) / 3
     if not all(map(math.isfinite, factor)) or mean <= 0:
         return [0.0, *colour]
-    made = multiplied(colour, factor, space, tint)
-    return [min(level * mean, LARGEST_FLOAT32), *(c / mean for c in made)]
+    made = (c * f / mean for c, f in zip(colour, factor, strict=True))
+    return [min(level * mean, LARGEST_FLOAT32), *made]
 
 
-def scaled_colour(base, factor, space=None):
+def scaled_colour(base, factor):
     """Return the same for a light without a level of its own: only the colour changes."""
     level, *colour = base
     if not all(map(math.isfinite, factor)):
         factor = (0.0, 0.0, 0.0)
-    return [level, *multiplied(colour, [max(f, 0.0) for f in factor], space)]
+    return [level, *(c * max(f, 0.0) for c, f in zip(colour, factor, strict=True))]
 
 
 def checked_factor(values):
@@ -91,37 +90,8 @@ def working_space(data):
     return SPACES.get(getattr(settings, "working_space_interop_id", ""))
 
 
-def multiplied(colour, factor, space=None, tint=None):
-    """Return a colour of a file with red, green and blue of Rec.709 multiplied, at least 0.
-
-    space: as `working_space` returns it. tint: of a colour that is multiplied by another of the
-    file, that one: their product is what is multiplied.
-    """
+def in_space(factor, space):
+    """Return multipliers of linear Rec.709 as those of a space of `working_space`."""
     if space is None:
-        return [c * f for c, f in zip(colour, factor, strict=True)]
-    tint = [t if t > 0 else 1.0 for t in tint or (1.0, 1.0, 1.0)]
-    whole = [c * t for c, t in zip(colour, tint, strict=True)]
-    shown = [f * c for c, f in zip(_solved(space, whole), factor, strict=True)]
-    made = [sum(m * c for m, c in zip(row, shown, strict=True)) for row in space]
-    return [max(c, 0.0) / t for c, t in zip(made, tint, strict=True)]
-
-
-def inverse(matrix):
-    """Return the inverse of a matrix of three rows."""
-    units = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return tuple(zip(*(_solved(matrix, unit) for unit in units), strict=True))
-
-
-def _solved(matrix, result):
-    """Return the vector that a matrix of three rows turns into `result`, by Cramer's rule."""
-    columns = list(zip(*matrix, strict=True))
-    whole = _determinant(columns)
-    return [
-        _determinant([result if i == k else column for i, column in enumerate(columns)]) / whole
-        for k in range(3)
-    ]
-
-
-def _determinant(columns):
-    (a, b, c), (d, e, f), (g, h, i) = columns
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+        return factor
+    return tuple(sum(m * f for m, f in zip(row, factor, strict=True)) for row in space)

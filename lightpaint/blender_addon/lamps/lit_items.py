@@ -9,23 +9,17 @@ Each place reads and writes [level, red, green, blue]:
     a shader with linked strength colour alone
     a shader with linked colour   a multiplication, which is put in front of it while it is not 1
 
-A lamp whose nodes make its colour is such a shader, too, in a file that does not work in Rec.709;
-there node groups on both sides of the multiplication let it work in Rec.709.
-
 Linked data, drivers, keyframes of others, emission inside node groups, and lamps at zero or below
 stay as they are. Their light is not a light group's, so the painter holds it as `rest`.
 """
 
 from dataclasses import dataclass, field
 
-from .lamp_units import inverse, scaled, scaled_colour, working_space
+from .lamp_units import scaled, scaled_colour
 from .memory import recall
 
 #: Name of the nodes that multiply a colour which other nodes make.
 MULTIPLIER_NAME = "lightpaint multiplier"
-
-#: Names of the node groups that convert colours to what multiplies them, and back.
-TO_REC709, FROM_REC709 = "lightpaint to Rec.709", "lightpaint from Rec.709"
 
 #: Shader nodes that emit: sockets that may hold their colour, and their strength.
 EMITTING_NODES = {
@@ -56,9 +50,9 @@ class LampEmission:
         """Set level and colour."""
         self.owner.energy, self.owner.color = values[0], values[1:]
 
-    def scaled(self, base, factor, space=None):
-        """Return level and colour for a multiplier of each channel. space: see lamp_units.py."""
-        return scaled(base, factor, space, None if space is None else tint_of(self.owner))
+    def scaled(self, base, factor):
+        """Return level and colour for a multiplier of each channel."""
+        return scaled(base, factor)
 
     def animated_target(self):
         """Return the data that has these properties' animation, and the paths there."""
@@ -79,8 +73,8 @@ class PlainColour(LampEmission):
     def assign(self, values):
         self.owner.color = values[1:]
 
-    def scaled(self, base, factor, space=None):
-        return scaled_colour(base, factor, space)
+    def scaled(self, base, factor):
+        return scaled_colour(base, factor)
 
 
 class NodeEmission:
@@ -110,10 +104,9 @@ class NodeEmission:
             self.strength.default_value = values[0]
         self.colour.default_value = [*values[1:], self.colour.default_value[3]]
 
-    def scaled(self, base, factor, space=None):
-        if self.is_textured:  # by a multiplication that works in Rec.709
-            return scaled_colour(base, factor)
-        return (scaled if self.has_strength else scaled_colour)(base, factor, space)
+    def scaled(self, base, factor):
+        has_level = self.has_strength and not self.is_textured
+        return (scaled if has_level else scaled_colour)(base, factor)
 
     def animated_target(self):
         if self.is_textured:
@@ -137,112 +130,21 @@ class NodeEmission:
         factor_socket = self.multiplier.inputs[1]
         factor_socket.default_value = factor
         if is_one and factor_socket.path_from_id("default_value") not in animated_paths(tree):
-            self._remove_multiplier()
-        else:
-            self._convert()
+            tree.links.new(self.multiplier.inputs[0].links[0].from_socket, self.colour)
+            tree.nodes.remove(self.multiplier)
+            self.multiplier = None
 
     def _add_multiplier(self):
-        node = self._add("VectorMath", -200)
+        tree = self.owner.node_tree
+        node = tree.nodes.new("ShaderNodeVectorMath")
         node.name = node.label = MULTIPLIER_NAME
         node.operation = "MULTIPLY"
         node.inputs[1].default_value = (1.0, 1.0, 1.0)
-        links = self.owner.node_tree.links
-        links.new(self.colour.links[0].from_socket, node.inputs[0])
-        links.new(node.outputs[0], self.colour)
-        self.multiplier = node
-
-    def _remove_multiplier(self):
-        tree, chain = self.owner.node_tree, self._chain()
-        tree.links.new(chain[0].inputs[0].links[0].from_socket, self.colour)
-        groups = [node.node_tree for node in chain if node.type == "GROUP"]
-        for node in chain:
-            tree.nodes.remove(node)
-        for group in groups:
-            if group.users == 0:
-                delete(group)
-        self.multiplier = None
-
-    def _add(self, kind, x):
-        node = self.owner.node_tree.nodes.new(f"ShaderNode{kind}")
         place = self.colour.node.location
-        node.location = (place.x + x, place.y - 150)
-        return node
-
-    def _chain(self):
-        """Return the multiplication and the conversions around it, in the order of light."""
-        before = self.multiplier.inputs[0].links[0].from_node
-        after = self.colour.links[0].from_node
-        ends = before, after
-        first, last = ([node] if is_conversion(node) else [] for node in ends)
-        return [*first, self.multiplier, *last]
-
-    def _convert(self):
-        """Multiply in Rec.709, whatever space the file has."""
-        space = file_space()
-        if space is not None and len(self._chain()) == 1:
-            before, after = self._add("Group", -350), self._add("Group", -50)
-            before.node_tree = conversion(TO_REC709, inverse(space))
-            after.node_tree = conversion(FROM_REC709, space)
-            link, multiplier = self.owner.node_tree.links.new, self.multiplier
-            link(multiplier.inputs[0].links[0].from_socket, before.inputs[0])
-            link(before.outputs[0], multiplier.inputs[0])
-            link(multiplier.outputs[0], after.inputs[0])
-            link(after.outputs[0], self.colour)
-
-
-def is_conversion(node):
-    """Return whether a node is one of those that `conversion` makes."""
-    group = node.node_tree if node.type == "GROUP" else None
-    return group is not None and group.name.startswith((TO_REC709, FROM_REC709))
-
-
-def conversion(name, matrix):
-    """Return the node group of a file that multiplies a colour by a matrix of three rows."""
-    import bpy
-
-    group = bpy.data.node_groups.get(name)
-    if group is None:
-        group = bpy.data.node_groups.new(name, "ShaderNodeTree")
-        for way in ("INPUT", "OUTPUT"):
-            group.interface.new_socket("Color", in_out=way, socket_type="NodeSocketVector")
-        nodes, link = group.nodes, group.links.new
-        start, end = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
-        combined = nodes.new("ShaderNodeCombineXYZ")
-        for c in range(3):
-            row = nodes.new("ShaderNodeVectorMath")
-            row.name, row.operation = f"Row {c}", "DOT_PRODUCT"
-            link(start.outputs[0], row.inputs[0])
-            link(row.outputs["Value"], combined.inputs[c])
-        link(combined.outputs[0], end.inputs[0])
-    for c in range(3):
-        group.nodes[f"Row {c}"].inputs[1].default_value = matrix[c]
-    return group
-
-
-def file_space():
-    """Return the working space of the file that is open, see lamp_units.py."""
-    import bpy
-
-    return working_space(bpy.data)
-
-
-def delete(group):
-    """Delete a node group."""
-    import bpy
-
-    bpy.data.node_groups.remove(group)
-
-
-def tint_of(light):
-    """Return what multiplies the colour of a lamp, in its file's space: temperature, nodes."""
-    tint = (1.0, 1.0, 1.0)
-    if getattr(light, "use_temperature", False):
-        tint = tuple(light.temperature_color)
-    for node in light.node_tree.nodes if has_nodes(light) else ():
-        if node.type == "EMISSION" and not node.inputs["Color"].is_linked:
-            colour = list(node.inputs["Color"].default_value)[:3]
-            return [a * b for a, b in zip(tint, colour, strict=True)]
-    return tint
+        node.location = (place.x - 200, place.y - 150)
+        tree.links.new(self.colour.links[0].from_socket, node.inputs[0])
+        tree.links.new(node.outputs[0], self.colour)
+        self.multiplier = node
 
 
 def _multiplier_before(socket):
@@ -250,8 +152,6 @@ def _multiplier_before(socket):
     if not socket.is_linked:
         return None
     node = socket.links[0].from_node
-    if is_conversion(node) and node.inputs[0].is_linked:
-        node = node.inputs[0].links[0].from_node
     is_ours = node.type == "VECT_MATH" and node.label == MULTIPLIER_NAME
     return node if is_ours and node.inputs[0].is_linked else None
 
@@ -346,7 +246,7 @@ def emitter_of(item, trees):
     trees: emission by name of material, for those that were looked at before.
     """
     if item.type == "LIGHT":
-        return _checked(LitItem(item, lamp_places(item.data)))
+        return _checked(LitItem(item, [LampEmission(item.data)]))
     places, hidden = [], []
     for slot in item.material_slots:
         if (material := slot.material) is not None and has_nodes(material):
@@ -359,15 +259,6 @@ def emitter_of(item, trees):
     if hidden:
         return LitItem(item, [], f"its emission is inside the node group {hidden[0]}")
     return _checked(LitItem(item, places)) if places else None
-
-
-def lamp_places(light):
-    """Return energy and colour of a lamp; or, where these are not enough, nodes of its colour."""
-    nodes = light.node_tree.nodes if has_nodes(light) else ()
-    linked = [x for x in nodes if x.type == "EMISSION" and x.inputs["Color"].is_linked]
-    if not linked or file_space() is None:
-        return [LampEmission(light)]
-    return [NodeEmission(light, node) for node in linked]
 
 
 def world_emitter(world):

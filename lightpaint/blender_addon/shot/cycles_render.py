@@ -34,6 +34,7 @@ SETTINGS = (
     ("render.image_settings.file_format", "OPEN_EXR_MULTILAYER"),
     ("render.image_settings.color_depth", "16"),
     ("render.image_settings.exr_codec", "ZIP"),
+    ("render.image_settings.color_management", "FOLLOW_SCENE"),
     ("cycles.use_denoising", False),
 )
 

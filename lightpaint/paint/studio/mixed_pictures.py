@@ -90,11 +90,11 @@ class _Mix:
         """Return all pixels, as a page has them, (h, w, 3) float16."""
         basis, weights = self.basis, self.weights
         if not self.request.is_clean:
-            mixed = basis.planes.mix(weights)
+            mixed = basis.mix(weights)
         elif basis.former is None:
             mixed = denoise_mix(basis, weights)
         else:
-            mixed = denoised(basis.planes.mix(weights), basis.features)
+            mixed = denoised(basis.mix(weights), basis.features)
         return as_halves(block_mean(mixed, page_factor(basis)))
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
-from lightpaint.basis import LightGroups
+from lightpaint.basis import LightGroups, multipliers_in
 from lightpaint.colour import ACESCG, REC2020, from_rec709, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
@@ -237,7 +237,7 @@ def _light_cells(groups: LightGroups, lighting: Lighting) -> list[tuple[str, ...
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
         is_known = light.name not in unreached and any(light.reached)
         stops = stops if is_known else "unknown"
-        numbers = [f"{v:.9g}" for v in (*light.weight, y)]
+        numbers = [f"{v:.9g}" for v in (*own_multipliers(groups, light.weight), y)]
         is_fixed_text = "yes" if light.is_fixed else "no"
         # Undetermined channels, whose multipliers are unchanged.
         notes = "".join(
@@ -266,14 +266,19 @@ def _row(*cells: str) -> str:
 
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:
     """Return a Python script for Blender that multiplies the lights in each light group."""
-    rows = [f"    {light.name!r}: {_rgb(light.weight)},\n" for light in _free(lighting)]
+    rows = [
+        f"    {light.name!r}: {_rgb(own_multipliers(groups, light.weight))},\n"
+        for light in _free(lighting)
+    ]
+    primaries = groups.basis.origin.primaries
     return filled_script(
         "set_lights.py.in",
         target=_in_docstring(lighting.target),
         source=_in_docstring(groups.name),
         multipliers="{\n" + "".join(rows) + "}",
-        keys="{\n" + "".join(_key_rows(lighting)) + "}",
+        keys="{\n" + "".join(_key_rows(groups, lighting)) + "}",
         render=repr(render_identity(groups)),
+        to_render=repr((from_rec709(primaries) if primaries else np.eye(3)).round(9).tolist()),
     )
 
 
@@ -294,7 +299,14 @@ def render_identity(groups: LightGroups) -> str:
     return digest.hexdigest()[:32]
 
 
-def _key_rows(lighting: Lighting) -> list[str]:
+def own_multipliers(groups: LightGroups, weight: Iterable[float]) -> list[float]:
+    """Return the multipliers of red, green and blue in the primaries in which the renderer of light
+    groups multiplies. weight: in Rec.709.
+    """
+    return list(map(float, multipliers_in(groups.basis.origin.primaries, np.array([*weight]))))
+
+
+def _key_rows(groups: LightGroups, lighting: Lighting) -> list[str]:
     """Return the keys of each adjusted light: frame, multipliers, and their slopes per frame."""
     keys, rows = lighting.animation, []
     slopes = key_slopes(keys) if keys else np.empty((0, 0, 3))
@@ -303,7 +315,8 @@ def _key_rows(lighting: Lighting) -> list[str]:
             continue
         rows.append(f"    {light.name!r}: [\n")
         for key, slope in zip(keys, slopes, strict=True):
-            rows.append(f"        ({key.frame}, {_rgb(key.weights[i])}, {_rgb(slope[i])}),\n")
+            own = (_rgb(own_multipliers(groups, x)) for x in (key.weights[i], slope[i]))
+            rows.append(f"        ({key.frame}, {', '.join(own)}),\n")
         rows.append("    ],\n")
     return rows
 

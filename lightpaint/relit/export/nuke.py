@@ -23,8 +23,8 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats, Position
-from lightpaint.basis import LightGroups, RenderLayer, free_name
-from lightpaint.colour import to_rec709
+from lightpaint.basis import LightGroups, RenderLayer, free_name, multipliers_in
+from lightpaint.colour import REC709, are_same, from_rec709, to_rec709
 from lightpaint.files import one_line
 from lightpaint.images.formats import ExrPart, rgb_channels
 from lightpaint.lighting import Lighting
@@ -87,26 +87,41 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
         lines += [*node("Read", inputs="0", **knobs, raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
-    # Multipliers refer to Rec.709; the result is converted back to the primaries of the file.
-    primaries = groups.layers[0].primaries
-    matrix = None if primaries is None else to_rec709(primaries)
-    to_light = None if needs_copy(groups) else matrix
+    # Lights are multiplied in the primaries of their renderer, mostly those of the file.
+    to_own, from_own = _conversions(groups)
     has_alpha = groups.beauty is not None and groups.beauty.alpha is not None
     if has_alpha:
         lines += _shuffle(beauty, files, "Alpha")
-    if groups.has_rest:
-        lines += _rest(lights, beauty, files) + _matrix(to_light, "Rest_in_Rec709")
+    has_rest = groups.has_rest and beauty is not None
+    if has_rest:
+        lines += _rest(lights, beauty, files) + _matrix(to_own, "Rest_multiplied")
     shuffled = [
-        _shuffle(x, files, f"Layer_{k}") + _matrix(to_light, f"Layer_{k}_in_Rec709")
+        _shuffle(x, files, f"Layer_{k}") + _matrix(to_own, f"Layer_{k}_multiplied")
         for k, x in enumerate(lights)
     ]
-    lines += _sum(groups, lighting, shuffled)
-    lines += _matrix(None if matrix is None else np.linalg.inv(matrix), "As_in_the_file")
+    lines += _sum(groups, lighting, shuffled, has_rest=has_rest)
+    lines += _matrix(from_own, "As_in_the_file")
     if has_alpha:
         lines += node(
             "Copy", inputs="2", from0="rgba.alpha", to0="rgba.alpha", name="Alpha_of_beauty"
         )
     return "\n".join(lines) + "\n"
+
+
+def _conversions(groups: LightGroups) -> tuple[Floats | None, Floats | None]:
+    """Return the matrices to the primaries in which lights are multiplied, from the layers that
+    Nuke reads, and from there to the primaries of the file; None where these are the same.
+    """
+    of_file = groups.layers[0].primaries
+    own = groups.basis.origin.primaries or None
+    of_layers = None if needs_copy(groups) else of_file
+
+    def matrix(source: tuple[float, ...] | None, to: tuple[float, ...] | None) -> Floats | None:
+        if are_same(source, to):
+            return None
+        return from_rec709(to or REC709) @ to_rec709(source or REC709)
+
+    return matrix(of_layers, own), matrix(own, of_file)
 
 
 def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
@@ -224,9 +239,11 @@ def _read(groups: LightGroups) -> list[RenderLayer]:
     return [*groups.layers, *([groups.beauty] if groups.beauty is not None else [])]
 
 
-def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]]) -> list[str]:
-    """Return nodes that multiply each light and add it to the others. shuffled: nodes that output
-    each light.
+def _sum(
+    groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]], *, has_rest: bool
+) -> list[str]:
+    """Return nodes that multiply each light and add it to the others, and to the rest if there is
+    one. shuffled: nodes that output each light.
     """
     lines: list[str] = []
     labels: list[str] = []
@@ -235,25 +252,30 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
         lines += nodes + node(
             "Multiply",
             channels="rgb",
-            value=_multipliers(lighting, light.name),
+            value=_multipliers(groups, lighting, light.name),
             name=f"Light_{k}",
             label=quoted(labels[-1]),
         )
-        if k or groups.has_rest:
+        if k or has_rest:
             lines += node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
     return lines
 
 
-def _multipliers(lighting: Lighting, name: str) -> str:
+def _multipliers(groups: LightGroups, lighting: Lighting, name: str) -> str:
     """Return the multipliers of a light, of lights that change as curves with a key at each frame.
 
     One more key at each end keeps a curve level there.
     """
+    primaries = groups.basis.origin.primaries
     if not lighting.animation:
-        return "{" + " ".join(f"{v:.9g}" for v in (*lighting[name].weight, 1)) + "}"
+        own = multipliers_in(primaries, np.array(lighting[name].weight))
+        return "{" + " ".join(f"{v:.9g}" for v in (*own, 1)) + "}"
     span = lighting.by_frame
     frames = [min(span) - 1, *span, max(span) + 1]
-    weights = [lighting.at_frame(frame)[name].weight for frame in frames]
+    weights = [
+        multipliers_in(primaries, np.array(lighting.at_frame(frame)[name].weight))
+        for frame in frames
+    ]
     curves = []
     for c in range(3):
         keys = [f"x{x} {rgb[c]:.9g}" for x, rgb in zip(frames, weights, strict=True)]

@@ -37,11 +37,38 @@ NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
 REC709 = "lin_rec709_scene"
 UNCONVERTED = {REC709, "lin_rec709", "raw", "data", "identity", "unknown"}
 
+#: USD's names of the spaces that OpenColorIO's configurations for ACES call otherwise.
+OCIO_NAMES = {
+    "ACES - ACEScg": "lin_ap1_scene",
+    "ACES2065-1": "lin_ap0_scene",
+    "ACES - ACES2065-1": "lin_ap0_scene",
+    "acescg": "lin_ap1_scene",
+    "lin_ap1": "lin_ap1_scene",
+    "Linear Rec.2020": "lin_rec2020_scene",
+    "lin_rec2020": "lin_rec2020_scene",
+    "Linear P3-D65": "lin_p3d65_scene",
+    "Linear Rec.709 (sRGB)": REC709,
+    "Utility - Linear - sRGB": REC709,
+}
+
 #: Ratio of a prim's surface to its area visible along its axis, or from the side.
 SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
 
 #: What of a light in a stage multiplies its emission by direction or place.
 MULTIPLYING = ("inputs:shaping:ies:file", "inputs:shaping:focus", "inputs:texture:file")
+
+#: What of a light in a stage nodes may make, and what is written here instead.
+CONNECTED = (
+    "inputs:intensity",
+    "inputs:exposure",
+    "inputs:color",
+    "inputs:enableColorTemperature",
+    "inputs:colorTemperature",
+    "inputs:normalize",
+    "inputs:diffuse",
+    "inputs:specular",
+    *MULTIPLYING,
+)
 
 #: Path of lights if there is no stage.
 SCOPE = "/lights"
@@ -65,13 +92,15 @@ class Overrides:
 
     left: names of lights that are not in it. unplaced: names of lights whose brightness is in it,
     but not their new place. in_part: names of lights that the stage hides, or lets shine on some
-    prims alone.
+    prims alone. unknown_spaces: colour spaces of the stage that are unknown, whose colours are
+    written as linear Rec.709.
     """
 
     text: str
     left: tuple[str, ...]
     unplaced: tuple[str, ...] = ()
     in_part: tuple[str, ...] = ()
+    unknown_spaces: tuple[str, ...] = ()
 
 
 def check_usd() -> None:
@@ -125,7 +154,8 @@ def usd_overrides(
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         like_stage(layer, stage)
-    return Overrides(layer.ExportToString(), unset_names, unplaced, in_part)
+    spaces = () if opened_stage is None else unknown_spaces(opened_stage)
+    return Overrides(layer.ExportToString(), unset_names, unplaced, in_part, spaces)
 
 
 def _write_lights(
@@ -230,12 +260,15 @@ def _override(prim: Any, present: Any, kind: str, parameter: str, emission: RGB)
     light.CreateNormalizeAttr(NORMALIZED[parameter])
     light.CreateDiffuseAttr(1.0)
     light.CreateSpecularAttr(1.0)
-    for name in MULTIPLYING:
-        if present is not None and (attribute := present.GetAttribute(name)).IsAuthored():
-            kind_of_value = attribute.GetTypeName()
-            prim.CreateAttribute(name, kind_of_value, custom=False).Block()
     if present is None:
         return
+    for name in MULTIPLYING:
+        if (attribute := present.GetAttribute(name)).IsAuthored():
+            prim.CreateAttribute(name, attribute.GetTypeName(), custom=False).Block()
+    for name in CONNECTED:
+        if (attribute := present.GetAttribute(name)).HasAuthoredConnections():
+            override = prim.CreateAttribute(name, attribute.GetTypeName(), custom=False)
+            override.SetConnections([])
     stage_light = UsdLux.LightAPI(present)
     if stage_light.GetFiltersRel().GetTargets():
         light.CreateFiltersRel().SetTargets([])
@@ -258,16 +291,65 @@ def _shines_in_part(opened_stage: Any, path: str) -> bool:
     return not is_whole
 
 
-def color_space_of(prim: Any) -> Any:
-    """Return the colour space of a light's colour; None for linear Rec.709, and in old USD."""
-    from pxr import Gf, Usd, UsdLux
+def declared_space(prim: Any) -> str:
+    """Return the name of the colour space that a stage declares for a light's colour, or "".
+
+    Before USD 24.11 stages declare none.
+    """
+    from pxr import Usd, UsdLux
 
     if prim is None or not hasattr(Usd, "ColorSpaceAPI"):
+        return ""
+    color = UsdLux.LightAPI(prim).GetColorAttr()
+    return str(Usd.ColorSpaceAPI.ComputeColorSpaceName(color, None))
+
+
+def rendering_space(stage: Any) -> str:
+    """Return the name of the space that the stage's settings let renderers work in, or ""."""
+    from pxr import UsdRender
+
+    settings = UsdRender.Settings.GetStageRenderSettings(stage)
+    name = settings.GetRenderingColorSpaceAttr().Get() if settings else None
+    return str(name or "")
+
+
+def color_space_of(prim: Any) -> Any:
+    """Return the colour space of a light's colour; None for linear Rec.709, and in old USD.
+
+    A colour without a declared space is in the rendering space (UsdLux).
+    """
+    if prim is None:
         return None
-    name = Usd.ColorSpaceAPI.ComputeColorSpaceName(UsdLux.LightAPI(prim).GetColorAttr(), None)
-    if not name or name in UNCONVERTED or not Gf.ColorSpace.IsValid(name):
+    return space_named(declared_space(prim) or rendering_space(prim.GetStage()))
+
+
+def space_named(name: str) -> Any:
+    """Return a colour space by name; None for linear Rec.709, for unknown ones, and in old USD."""
+    from pxr import Gf
+
+    name = OCIO_NAMES.get(name, name)
+    if not name or name in UNCONVERTED or not _is_known(name):
         return None
     return Gf.ColorSpace(name)
+
+
+def _is_known(name: str) -> bool:
+    from pxr import Gf
+
+    return hasattr(Gf, "ColorSpace") and bool(Gf.ColorSpace.IsValid(name))
+
+
+def unknown_spaces(stage: Any) -> tuple[str, ...]:
+    """Return the names of spaces that a stage has colours of lights in, and that are unknown."""
+    from pxr import UsdLux
+
+    names = dict.fromkeys(
+        declared_space(prim) or rendering_space(stage)
+        for prim in stage.Traverse()
+        if prim.HasAPI(UsdLux.LightAPI)
+    )
+    known = {"", *UNCONVERTED, *OCIO_NAMES}
+    return tuple(name for name in names if name not in known and not _is_known(name))
 
 
 def from_rec709(color: Sequence[float], space: Any) -> RGB:
@@ -507,7 +589,9 @@ def set_image(prim: Any, file: str) -> None:
     from pxr import Sdf
 
     asset = Sdf.ValueTypeNames.Asset
-    prim.CreateAttribute("inputs:texture:file", asset, custom=False).Set(f"./{file}")
+    attribute = prim.CreateAttribute("inputs:texture:file", asset, custom=False)
+    attribute.Set(f"./{file}")
+    attribute.SetColorSpace(REC709)
 
 
 def _write_transform(prim: Any, matrix: Doubles, is_reset: bool) -> None:

@@ -8,7 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lightpaint.arrays import RGB
+from lightpaint.basis import multipliers_in
+from lightpaint.colour import to_rec709
 from lightpaint.relit.export import usd
 
 #: End of the attributes in which renderers keep the tag of a light, such as
@@ -23,6 +27,7 @@ def usd_multipliers(
     *,
     about: str = "",
     by_frame: Mapping[int, Mapping[str, RGB]] | None = None,
+    primaries: tuple[float, ...] = (),
 ) -> usd.Overrides:
     """Return a layer that multiplies lights of a stage.
 
@@ -36,6 +41,7 @@ def usd_multipliers(
         about: Text for the layer's comment.
         by_frame: The multipliers at each frame, of lights that change over a shot: they become time
             samples instead.
+        primaries: In which the renderer multiplies lights, as in `Origin`.
 
     Returns:
         The layer; its `left` has the groups without a light, and those whose lights are animated,
@@ -60,12 +66,13 @@ def usd_multipliers(
         for prim in members:
             override = layer_stage.OverridePrim(prim.GetPath())
             if not by_frame:
-                _multiply(override, prim, multiplier, Usd.TimeCode.Default())
+                _multiply(override, prim, multiplier, Usd.TimeCode.Default(), primaries)
             for frame, at_frame in (by_frame or {}).items():
-                _multiply(override, prim, at_frame[group], Usd.TimeCode(frame))
+                _multiply(override, prim, at_frame[group], Usd.TimeCode(frame), primaries)
     layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
     usd.like_stage(layer, stage)
-    return usd.Overrides(layer.ExportToString(), tuple(left))
+    spaces = usd.unknown_spaces(opened_stage)
+    return usd.Overrides(layer.ExportToString(), tuple(left), unknown_spaces=spaces)
 
 
 def lights_of_group(lights: Sequence[Any], group: str) -> list[Any]:
@@ -98,26 +105,55 @@ def _is_light(prim: Any) -> bool:
 
 
 def _is_animated(prim: Any) -> bool:
+    """Return whether time samples or nodes make the brightness or colour of a light."""
     from pxr import UsdLux
 
     light = UsdLux.LightAPI(prim)
     attributes = light.GetIntensityAttr(), light.GetColorAttr()
-    return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
+    return any(x.ValueMightBeTimeVarying() or x.HasAuthoredConnections() for x in attributes)
 
 
-def _multiply(override: Any, prim: Any, multiplier: RGB, time: Any) -> None:
+def _multiply(
+    override: Any, prim: Any, multiplier: RGB, time: Any, primaries: tuple[float, ...]
+) -> None:
     """Scale intensity and colour at a time. The greatest multiplier goes to the intensity, so that
     the colour stays between 0 and 1 where it was.
+
+    multiplier: in Rec.709. primaries: in which the renderer multiplies, where it also multiplies
+    the colour by temperature and texture, which stay.
     """
     from pxr import Gf, UsdLux
 
     present, light = UsdLux.LightAPI(prim), UsdLux.LightAPI(override)
-    greatest = max(multiplier)
+    own = multipliers_in(primaries, np.array(multiplier))
+    greatest = float(own.max())
     intensity = present.GetIntensityAttr().Get() * max(greatest, 0.0)
     light.CreateIntensityAttr().Set(intensity, time)
     if greatest <= 0:
         return
-    space = usd.color_space_of(prim)
-    color = usd.to_rec709(present.GetColorAttr().Get(), space)
-    scaled = [c * m / greatest for c, m in zip(color, multiplier, strict=True)]
-    light.CreateColorAttr().Set(Gf.Vec3f(*usd.from_rec709(scaled, space)), time)
+    color = np.array(present.GetColorAttr().Get(), np.float64)
+    space = _space_of(prim, primaries)
+    if space is not None:  # the colour is in another space than the one in which light multiplies
+        color = multipliers_in(primaries, np.array(usd.to_rec709(color.tolist(), space)))
+    color = color * own / greatest
+    if space is not None:
+        rec709 = color @ to_rec709(primaries).T if primaries else color
+        color = np.array(usd.from_rec709(rec709.tolist(), space))
+    light.CreateColorAttr().Set(Gf.Vec3f(*color.tolist()), time)
+
+
+def _space_of(prim: Any, primaries: tuple[float, ...]) -> Any:
+    """Return the space of a light's colour, as of `usd.color_space_of`; None where the renderer
+    multiplies it as it is: a colour without a declared space is in the rendering space.
+    """
+    from pxr import Gf
+
+    declared = usd.declared_space(prim)
+    if not declared:
+        return None
+    space = usd.space_named(declared)
+    if space is None:
+        return Gf.ColorSpace(usd.REC709) if primaries else None
+    corners = [x for xy in space.GetPrimariesAndWhitePoint()[:3] for x in xy]
+    is_own = bool(primaries) and np.allclose(corners, primaries[:6], rtol=0, atol=0.01)
+    return None if is_own else space

@@ -208,7 +208,7 @@ def _compact_planes(
         if planes is not None:
             pictures += [small(planes.mix(mix)) for mix in mixes]
         elif mixes:
-            pictures += [small(mix) for mix in basis.planes.mixes(np.array(mixes))]
+            pictures += [small(mix) for mix in basis.mixes(np.array(mixes))]
     return list(pictures[0].shape[:2]), parallel_map(plane_data, pictures)
 
 

@@ -1,8 +1,10 @@
 """Runs in Blender: multiplies lights whose colour something else multiplies, too, and prints how.
 
 Arguments: the working space; "script" for set_lights.py, "keys" for one that animates, at frame 3,
-"addon" for the add-on; and a folder with the script and the multipliers. Not a test by itself:
-test_working_spaces.py runs it.
+"addon" for the add-on; and a folder with the script and the multipliers. "render" and "again" make
+pictures of a room with coloured walls instead: `first.exr` with light groups and `painted.exr`,
+whose lights are multiplied by hand in the working space; and `again.exr`, with set_lights.py. Not a
+test by itself: test_working_spaces.py runs it.
 """
 
 import json
@@ -64,7 +66,8 @@ def lights():
     lamp("warm", (1, 0.6, 0.3), use_temperature=True, temperature=2500.0)
     tinted = lamp("tinted", (1, 0.6, 0.3))
     shader_of(tinted, "EMISSION").inputs["Color"].default_value = (0.2, 0.5, 1, 1)
-    linked(lamp("nodes", (1, 1, 1)), "EMISSION", "ShaderNodeBlackbody", Temperature=4000.0)
+    for name, color in (("nodes", (1, 1, 1)), ("both", (1, 0.6, 0.3))):
+        linked(lamp(name, color), "EMISSION", "ShaderNodeBlackbody", Temperature=4000.0)
     bpy.ops.mesh.primitive_plane_add(size=0.5, location=(0, 0, 2), rotation=(3.14159265, 0, 0))
     panel = bpy.context.object
     panel.name = "texture"
@@ -117,7 +120,75 @@ def node_counts():
     return [len(tree.nodes) for tree in trees if tree] + [len(bpy.data.node_groups)]
 
 
+def multiply_by_hand(items):
+    """Multiply lights by their factors as they are, in the working space."""
+    for name, item in items.items():
+        factor = FACTORS[name]
+        if name in ("texture", "sky"):
+            owner = item if name == "sky" else item.data.materials[0]
+            socket = shader_of(owner, "BACKGROUND" if name == "sky" else "EMISSION").inputs["Color"]
+            node = owner.node_tree.nodes.new("ShaderNodeVectorMath")
+            node.operation, node.inputs[1].default_value = "MULTIPLY", factor
+            owner.node_tree.links.new(socket.links[0].from_socket, node.inputs[0])
+            owner.node_tree.links.new(node.outputs[0], socket)
+        else:
+            item.data.color = [c * f for c, f in zip(item.data.color, factor, strict=True)]
+
+
+def room(items):
+    """Walls of colours that Rec.709 and the working space multiply otherwise."""
+    for k, (name, item) in enumerate(items.items()):
+        if name != "sky":
+            item.location = (1.5 * (k % 3 - 1), 1.2 * (k // 3) - 1, 1 + 0.4 * k)
+    for color, location, rotation in (
+        ((0.7, 0.05, 0.02), (0, 0, 0), (0, 0, 0)),
+        ((0.03, 0.6, 0.05), (0, 3, 2), (1.5708, 0, 0)),
+        ((0.05, 0.08, 0.7), (-3, 0, 2), (0, 1.5708, 0)),
+        ((0.6, 0.5, 0.4), (3, 0, 2), (0, -1.5708, 0)),
+    ):
+        bpy.ops.mesh.primitive_plane_add(size=7, location=location, rotation=rotation)
+        bpy.context.object.data.materials.append(surface("wall", "ShaderNodeBsdfDiffuse", color))
+    camera = added("camera", bpy.data.cameras.new("camera"))
+    camera.location, camera.rotation_euler, camera.data.lens = (0, -6, 2.5), (1.4, 0, 0), 22
+    bpy.context.scene.camera = camera
+
+
+def save_render(name):
+    scene = bpy.context.scene
+    scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+    scene.render.filepath = str(FOLDER / name)
+    bpy.ops.render.render(write_still=True)
+
+
+def render_room():
+    """Render with light groups, and again with lights multiplied by hand."""
+    empty_scene(32, 24, 64)
+    bpy.ops.wm.set_working_color_space(working_space=SPACE)
+    cycles = bpy.context.scene.cycles
+    cycles.sample_clamp_indirect = 0
+    cycles.use_light_tree = False  # which would sample other lights where these are brighter
+    items = lights()
+    bpy.context.scene.world = items["sky"]
+    room(items)
+    save_render("first.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "room.blend"))
+    multiply_by_hand(items)
+    save_render("painted.exr")
+
+
 def main():
+    if WAY == "render":
+        return render_room()
+    if WAY == "again":
+        bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "room.blend"))
+        runpy.run_path(str(FOLDER / "set_lights.py"))
+        return save_render("again.exr")
+    return compare_lamps()
+
+
+def compare_lamps():
+    """Print the radiance of a white floor under each lamp before and after its multiplication."""
     scene = empty_scene(8, 8, 16)
     bpy.ops.wm.set_working_color_space(working_space=SPACE)
     scene.cycles.max_bounces = 0

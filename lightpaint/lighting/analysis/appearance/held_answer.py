@@ -60,7 +60,7 @@ def hold_to_current(
 
     finish: what is done to each answer once it is solved, as the correction of its noise.
     """
-    problem = solution.problem
+    problem = solution.problem.as_given()
     is_sketch = are_sketches(problem.views)
     if not problem.fit.reads_wishes(is_sketch=is_sketch) or problem.constraints.sparse is not None:
         return solution
