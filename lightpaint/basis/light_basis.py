@@ -11,7 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.plane_results import array_name, array_once, forget_results
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes, relative_variances
-from lightpaint.basis.working_primaries import check_primaries, mixes_in, response_in
+from lightpaint.basis.working_primaries import check_primaries, mixes_in, picture_at, response_in
 from lightpaint.colour import choose_exposure, luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
@@ -418,13 +418,22 @@ class Basis(Shown):
         planes = {k: response_in(self.origin.primaries, self.planes.plane(k)) for k in adjusted}
         return self.planes.replaced(planes)
 
+    def _planes_at(self, weights: Doubles) -> Planes:
+        """Return planes that add up to what the renderer shows of each light at weights (n, 3)."""
+        primaries, planes = self.origin.primaries, self.planes
+        adjusted = [k for k, light in enumerate(self.lights) if not light.is_fixed]
+        return planes.replaced(
+            {k: picture_at(primaries, planes.plane(k), weights[k]) for k in adjusted}
+        )
+
     def as_multiplied(self, weights: Doubles, planes: Planes | None = None) -> "Basis":
         """Return a basis whose planes add up to `mix` at some weights, (n, 3): what multiplying in
-        the renderer's primaries changes there is in its `rest`. Its current look stays.
+        the renderer's primaries changes there is in the lights and, where they are off, in its
+        `rest`. Its current look stays.
 
-        planes: other planes of the lights, such as `channel_responses`.
+        planes: of the lights, such as `channel_responses`, by default their pictures at `weights`.
         """
-        planes = self.planes if planes is None else planes
+        planes = self._planes_at(weights) if planes is None else planes
         rest = next(k for k, light in enumerate(self.lights) if light.plugin == REST)
         change = self.mix(weights) - planes.mix(weights)
         return replace(

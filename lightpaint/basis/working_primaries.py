@@ -24,6 +24,9 @@ Primaries = tuple[float, ...]
 #: Tolerance for primaries that files round.
 ROUNDING = 1e-3
 
+#: Least channel of a weight, relative to its largest, whose picture is more than spill of others.
+LEAST_CHANNEL = 0.05
+
 
 def working_primaries(primaries: Primaries | None) -> Primaries:
     """Return the primaries in which the renderer of a file multiplies lights; () for Rec.709.
@@ -88,3 +91,15 @@ def response_in(primaries: Primaries, plane: Floats) -> Floats:
     """
     own, back = from_rec709(primaries), to_rec709(primaries)
     return np.asarray(plane @ ((back * own.T) @ own).T, np.float32)
+
+
+def picture_at(primaries: Primaries, plane: Floats, weight: Doubles) -> Floats:
+    """Return a picture whose product with a light's weight, (3,), is what a renderer shows that
+    multiplies in some primaries, in all channels in which the weight is not next to nothing.
+
+    plane: (h, w, 3), the picture at a weight of 1.
+    """
+    own, back = from_rec709(primaries), to_rec709(primaries)
+    shown = plane @ ((back * (own @ weight)) @ own).T
+    is_lit = weight > LEAST_CHANNEL * weight.max()
+    return np.where(is_lit, shown / np.where(is_lit, weight, 1), plane).astype(np.float32)

@@ -307,8 +307,9 @@ class Problem(linear_problem.LinearProblem):
         """Return this problem, before a solve, on planes that add up to the render at weights (n,
         3); see `Basis.as_multiplied`. planes: of each view.
         """
-        bases, planes = self.views.bases, planes or [x.planes for x in self.views.bases]
-        multiplied = [x.as_multiplied(weights, y) for x, y in zip(bases, planes, strict=True)]
+        bases = self.views.bases
+        of_views = [None] * len(bases) if planes is None else planes
+        multiplied = [x.as_multiplied(weights, y) for x, y in zip(bases, of_views, strict=True)]
         return replace(self._with_bases(multiplied), given=bases)
 
     def as_given(self) -> "Problem":
