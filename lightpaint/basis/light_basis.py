@@ -46,7 +46,7 @@ class Origin:
     `Basis.extra`).
     observer: what sees it, of a basis with spectra; "" for RGB.
     primaries: CIE xy of red, green, blue and white of the primaries in which the renderer of light
-    groups multiplies lights, if they are not those of Rec.709; see `Basis.mix`.
+    groups multiplies lights, if it works in others than Rec.709; see `Basis.mix`.
     """
 
     scene: str

@@ -33,7 +33,7 @@ def answer_as_multiplied(
 ) -> Solution:
     """Return the answer whose prediction is what the renderer shows that multiplies these lights.
 
-    It is the solution itself, unless its basis names primaries that are not those of Rec.709.
+    It is the solution itself, unless its basis names other primaries than Rec.709.
     finish: what is done to each answer once it is solved.
     """
     problem, w = solution.problem, solution.weights

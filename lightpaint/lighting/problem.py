@@ -133,7 +133,7 @@ class Problem(linear_problem.LinearProblem):
         holding: The pull to the current lights that holds an answer which would lead away from the
             paint; None without.
         given: The bases of the views of light groups whose renderer multiplies in other primaries,
-            where those of the problem add up to its picture at one lighting; () for others.
+            where the bases of the problem add up to its picture at one lighting; () for others.
         filter_share: The share of a Gaussian reconstruction filter whose effect was taken out of
             the paintings, which are renders; 0 without one.
 

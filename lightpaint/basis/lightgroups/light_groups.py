@@ -136,7 +136,7 @@ def read_light_groups(
 
 
 def _remark_on_primaries(primaries: tuple[float, ...]) -> str:
-    """Return a sentence on a file whose primaries are not those of Rec.709."""
+    """Return a sentence on a file of other primaries than Rec.709."""
     worked_in = working_primaries(primaries)
     if not worked_in:
         return (

@@ -91,7 +91,7 @@ def working_space(data):
 
 
 def in_space(factor, space):
-    """Return multipliers of linear Rec.709 as those of a space of `working_space`."""
+    """Return multipliers of linear Rec.709 as multipliers of a space of `working_space`."""
     if space is None:
         return factor
     return tuple(sum(m * f for m, f in zip(row, factor, strict=True)) for row in space)

@@ -87,7 +87,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
         lines += [*node("Read", inputs="0", **knobs, raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
-    # Lights are multiplied in the primaries of their renderer, mostly those of the file.
+    # Lights are multiplied in the primaries of their renderer, mostly the same as of the file.
     to_own, from_own = _conversions(groups)
     has_alpha = groups.beauty is not None and groups.beauty.alpha is not None
     if has_alpha:
