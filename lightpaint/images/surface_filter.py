@@ -15,6 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.images.denoiser import DARKEST, Features
+from lightpaint.images.pixel_blocks import block_mean, enlarged
 from lightpaint.threads import parallel_map
 
 #: Radius of the filter in pixels, which is two standard deviations.
@@ -57,6 +58,18 @@ class SurfaceFilter:
 
         parallel_map(fill, self._weighed_bands if self.is_quick else self._bands())
         return filtered
+
+    def enlarged(self, small: Floats, factor: int) -> Floats:
+        """Return a picture of blocks of factor × factor pixels at the size of the filter, filtered,
+        (h, w, 3) float32.
+
+        small: (h // factor, w // factor, 3). What averages of neighbours on a surface make of a
+        block is its light, so that the edges of surfaces and the grain of their albedo come back.
+        """
+        albedo = np.moveaxis(self._albedo, 0, -1)
+        light = enlarged(small / block_mean(albedo, factor), factor)
+        rest = [(0, side - known) for side, known in zip(self.size, light.shape[:2], strict=True)]
+        return self(np.pad(light, [*rest, (0, 0)], mode="edge") * albedo)
 
     @property
     def is_quick(self) -> bool:

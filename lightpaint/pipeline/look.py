@@ -222,8 +222,9 @@ def write_report(
             film = relit if size == relit.size else relit.reduced(f"{width}x{height}")
             larger_features = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
+    factor = report.look_reduction(look.basis.size)
     looks = report.CleanLooks.clean(
-        look.basis, weights, predicted, verified, larger=larger_features
+        look.basis, weights, predicted, verified, larger=larger_features, factor=factor
     )
     transform = report.report_transform(look.target, look.basis, predicted)
     missed = report.residual_of(look.solution, predicted, transform=transform)

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from lightpaint.report.answer_pictures import (
         CleanLooks, report_transform, residual_of, spoken_view, target_picture,
     )
-    from lightpaint.report.basis_memo import make_ahead, page_reduction
+    from lightpaint.report.basis_memo import look_reduction, make_ahead, page_reduction
     from lightpaint.report.comparison import comparison_image, shorten_to_width
     from lightpaint.report.contact_sheet import light_sheet
     from lightpaint.report.diagnosis_sentences import (

@@ -3,6 +3,9 @@
 All are (h, w, 3) in display values [0, 1]. Pixels that do not count are shown as the
 current look, grey and dim, so that they cannot be taken for paint; in the map of importance they
 are hatched, too.
+
+The current look that a picture is laid over decides its size: where it has one pixel for a block of
+pixels of the film, so has the picture.
 """
 
 import math
@@ -18,7 +21,7 @@ from lightpaint.arrays import Doubles, Floats, Indices, largest
 from lightpaint.basis import Basis, denoise_current_look, denoise_mix, denoise_mixes, meter_exposure
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.lighting import Solution
-from lightpaint.report.basis_memo import cached_clean_planes
+from lightpaint.report.basis_memo import cached_clean_planes, look_reduction
 from lightpaint.target import Target
 
 #: Conversion of a band of display values into its final form.
@@ -108,8 +111,9 @@ def over_unpainted(
     """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w).
 
     encode: makes display values of a band of `picture`, (h, w, …). finish: converts each band,
-    for example by `to_8_bit`.
+    for example by `to_8_bit`. Picture and share may be larger than the look, by whole blocks.
     """
+    picture, share = _reduced(picture, share, current.shape[:2])
 
     def lay(band: Floats, share: Floats, dim: Floats) -> npt.NDArray[Any]:
         share = share[..., None]
@@ -117,6 +121,24 @@ def over_unpainted(
 
     rest = _dim_look(current, transform, hatched=hatched)
     return np.asarray(images.by_bands(lay, picture, share, rest))
+
+
+def _reduced(picture: Floats, share: Floats, size: images.Size) -> tuple[Floats, Floats]:
+    """Return a picture, (h, w, …), and its share of each pixel, (h, w), as means over the blocks
+    that are pixels of a picture of `size`.
+
+    A pixel of the picture counts by its share. A picture that has that size is left as it is.
+    """
+    factor = images.whole_factor(share.shape, size) or 1
+    if factor == 1:
+        return picture, share
+    small = images.block_mean(share, factor)
+    if picture.shape[:2] != share.shape:
+        return picture, small
+    by_share = (..., *(None,) * (picture.ndim - 2))
+    total = images.block_mean(picture * share[by_share], factor)
+    nothing = np.zeros_like(total)
+    return np.divide(total, small[by_share], out=nothing, where=small[by_share] > 0), small
 
 
 def target_picture(
@@ -141,7 +163,8 @@ def target_picture(
         share = share[..., None]
         return finish(share * transform.encode(paint) + (1 - share) * transform.encode(look))
 
-    return np.asarray(images.by_bands(lay, target.image, share, current))
+    image, share = _reduced(target.image, share, current.shape[:2])
+    return np.asarray(images.by_bands(lay, image, share, current))
 
 
 def importance_picture(
@@ -290,6 +313,15 @@ class Encoder(ViewTransform):
         return self.encoded[id(image)][1]
 
 
+def _verified_factor(verified: Floats, basis: Basis, factor: int) -> int:
+    """Return the side of the blocks of a verification, which has as many pixels as the other looks
+    or, where these are few, more. factor: side of the blocks of the other looks.
+    """
+    side = factor * (images.whole_factor(verified.shape[:2], basis.size) or 1)
+    least = look_reduction(verified.shape[:2]) if factor > 1 else 1
+    return next(x for x in range(least, side + 1) if side % x == 0)
+
+
 @dataclass(frozen=True)
 class CleanLooks:
     """Current look, prediction and verification, (h, w, 3) linear.
@@ -313,37 +345,48 @@ class CleanLooks:
         verified: Floats | None,
         *,
         larger: images.Features | None = None,
+        factor: int = 1,
     ) -> "CleanLooks":
         """Make the looks without their grain.
 
         weights: (n, 3), of which `predicted` is the sum. larger: of a verification that has another
-        size than the basis.
+        size than the basis. factor: side of the blocks of pixels that become one; the looks of a
+        page are denoised coarsely.
         """
         features = basis.features
-        if verified is not None:
-            verified = images.denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = images.denoiser_text(features, raw=raw)
+        if verified is not None:
+            side = _verified_factor(verified, basis, factor)
+            guides = larger or features
+            verified = images.denoised(
+                images.block_mean(verified, side), guides and guides.reduced(side)
+            )
         planes = cached_clean_planes(basis)
         if planes is None and basis.former is None:
-            looks = [basis.current_look, predicted]
-            now, answer = denoise_mixes(basis, [basis.current_weights, weights], mixed=looks)
+            both, looks = [basis.current_weights, weights], [basis.current_look, predicted]
+            now, answer = denoise_mixes(basis, both, mixed=looks, factor=factor, quality="coarse")
             return cls(now, answer, verified, texts)
-        if planes is None or basis.former is not None:
-            now = denoise_current_look(basis)
-        else:
-            now = planes.current
+        size = images.blocks_in(basis.size, factor)
+        known = None if planes is None or basis.former is not None else planes.look(size)
+        now = (
+            denoise_current_look(basis, factor=factor, quality="coarse") if known is None else known
+        )
         if planes is None or not planes.is_whole:
-            answer = denoise_mix(basis, weights, mixed=predicted)
+            answer = denoise_mix(basis, weights, mixed=predicted, factor=factor, quality="coarse")
         else:
-            answer = planes.mix(weights)
+            answer = images.block_mean(planes.mix(weights), factor)
         return cls(now, answer, verified, texts)
 
     @classmethod
-    def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":
-        """Make the looks as rendered."""
-        current = basis.current_look
-        return cls(current, predicted, verified, {})
+    def raw(
+        cls, basis: Basis, predicted: Floats, verified: Floats | None, *, factor: int = 1
+    ) -> "CleanLooks":
+        """Make the looks as rendered. factor: side of the blocks of pixels that become one."""
+        if verified is not None:
+            verified = images.block_mean(verified, _verified_factor(verified, basis, factor))
+        now, answer = (images.block_mean(x, factor) for x in (basis.current_look, predicted))
+        return cls(now, answer, verified, {})
 
     def encoder(self, transform: ViewTransform) -> Encoder:
         """Return the encoder of a transform, which encodes each look once for all places."""

@@ -12,7 +12,7 @@ from lightpaint.basis import (
     obtain_denoised_planes,
     read_denoised_planes,
 )
-from lightpaint.images import fitting_factor
+from lightpaint.images import Size, fitting_factor
 from lightpaint.threads import start_in_background
 
 #: Rows of a long list that are always visible, and the largest number of further rows that are not
@@ -21,6 +21,9 @@ ROWS_SHOWN, SPARE_ROWS = 10, 3
 
 #: Maximum width of a plane in a page, in pixels, and maximum number of pixels in all planes.
 MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
+
+#: Maximum width of the pictures of the scene in a page, which shows them 1132 pixels wide.
+LOOK_MAX_WIDTH = 1280
 
 
 def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) -> int:
@@ -37,6 +40,14 @@ def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) ->
     return factor
 
 
+def look_reduction(size: Size) -> int:
+    """Return the side of the blocks of pixels that become a pixel of a picture of the scene.
+
+    size: (height, width) of the film.
+    """
+    return fitting_factor(size, -(-size[1] // LOOK_MAX_WIDTH))
+
+
 def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
     """Return denoised planes of a basis, made once: whole ones if they are kept, or the planes of a
     page that shows all lights. None where it shows some, which are then denoised alone.
@@ -44,8 +55,12 @@ def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
     count = len(basis.lights)
     if count > ROWS_SHOWN + SPARE_ROWS:
         return make_once(basis.planes, "planes", lambda: read_denoised_planes(basis))
-    factor = page_reduction(basis, count)
-    return make_once(basis.planes, "planes", lambda: obtain_denoised_planes(basis, factor=factor))
+    factor, look_factor = page_reduction(basis, count), look_reduction(basis.size)
+    return make_once(
+        basis.planes,
+        "planes",
+        lambda: obtain_denoised_planes(basis, factor=factor, look_factor=look_factor),
+    )
 
 
 def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:

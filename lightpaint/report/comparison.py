@@ -13,6 +13,7 @@ from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting import Appearance, Solution, compare_appearance
 from lightpaint.report import answer_pictures
+from lightpaint.report.basis_memo import look_reduction
 from lightpaint.report.phrases import spoken_progress
 from lightpaint.report.verdict_sentences import are_held_back
 from lightpaint.target import Target
@@ -52,15 +53,17 @@ def comparison_image(
     """Draw the pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
     predicted, verified: (h, w, 3) linear, the latter possibly at a multiple of the size; smaller
-    pictures are shown with larger pixels. Three pictures where `verified` is None. The residual is
-    false-coloured luminance of prediction minus target, of raw data; pixels that do not count are
-    grey and dim. verified_spp: samples per pixel of `verified`, which its caption says,
-    since few show no small patches of light. appearance: the result of `compare_appearance`, if
-    known. looks: shown instead of raw renders. missed: the result of `residual_of`. Raises
-    SizeError if target and basis differ in size.
+    pictures are shown with larger pixels, large ones reduced as in a page. Three pictures where
+    `verified` is None. The residual is false-coloured luminance of prediction minus target, of raw
+    data; pixels that do not count are grey and dim. verified_spp: samples per pixel of `verified`,
+    which its caption says, since few show no small patches of light. appearance: the result of
+    `compare_appearance`, if known. looks: shown instead of raw renders. missed: the result of
+    `residual_of`. Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    looks = looks or answer_pictures.CleanLooks.raw(basis, predicted, verified)
+    looks = looks or answer_pictures.CleanLooks.raw(
+        basis, predicted, verified, factor=look_reduction(basis.size)
+    )
     transform = looks.encoder(answer_pictures.report_transform(target, basis, predicted))
     view_note = (
         f" ({answer_pictures.spoken_view(transform)})"

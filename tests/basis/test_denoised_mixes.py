@@ -184,6 +184,32 @@ def test_direct_light_is_averaged_along_surfaces(
 
 
 @pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
+def test_coarse_pictures_are_nearly_as_close(rng: np.random.Generator):
+    """Their errors are those of a fourth of the samples in blocks of four pixels: of one size."""
+    pools, glow = pools_and_glow()
+    basis = replace(split_basis(pools, glow, rng), features=wall())
+    truth, raw = pools + glow, basis.planes.plane(0)
+    fast, coarse = (
+        float(np.square(denoise_plane(basis, 0, quality=quality) - truth).mean())
+        for quality in ("fast", "coarse")
+    )
+    assert coarse < 1.5 * fast
+    assert coarse < 0.05 * np.square(raw - truth).mean()
+
+
+@pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
+def test_coarse_pictures_keep_what_a_mirror_shows():
+    """Edges in indirect light without noise, which no surface has and blocks of pixels lose."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    seen = ((x // 3 + y // 3) % 2 * np.float32(0.4))[..., None] * np.ones(3, np.float32)
+    plain = split_basis(0 * seen, seen, np.random.default_rng(5))
+    parts = IndirectLight(as_planes(seen[None]), as_planes(0 * seen[None]))
+    planes, noise = as_planes(seen[None]), as_planes(0 * seen[None])
+    basis = replace(plain, planes=planes, noise=noise, indirect=parts, features=wall())
+    np.testing.assert_allclose(denoise_plane(basis, 0, quality="coarse"), seen, atol=1e-6)
+
+
+@pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
 def test_the_filter_does_not_spread_what_no_surface_shows(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ):

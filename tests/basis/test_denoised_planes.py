@@ -97,6 +97,28 @@ def test_planes_of_a_file_are_known_without_reading_them(
     assert len(hashed) == 4
 
 
+def test_blocks_of_a_file_are_kept_without_reading_all_planes(
+    make_basis: Any, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+):
+    """Nor is the look as large as the film, if it is shown smaller."""
+    path = tmp_path_factory.mktemp("saved") / "a.basis.exr"
+    write_basis(path, make_basis(2, (48, 64)))
+    monkeypatch.setattr(denoised_planes, "_content_keys", lambda _: pytest.fail("reads all"))
+    first = obtain_denoised_planes(read_basis(path), factor=4, look_factor=2)
+    assert first is not None
+    assert not first.is_whole
+    assert first.halves.shape == (2, 12, 16, 3)
+    assert first.current.shape == (24, 32, 3)
+    again = read_denoised_planes(read_basis(path), factor=4, look_factor=2)
+    assert again is not None
+    np.testing.assert_array_equal(again.halves, first.halves)
+    np.testing.assert_array_equal(again.current, first.current)
+    # A painter wants the whole look.
+    assert read_denoised_planes(read_basis(path), factor=4) is None
+    assert first.look((12, 16)) is not None
+    assert first.look((48, 64)) is None
+
+
 @pytest.mark.parametrize("factor", [1, 2])
 def test_planes_that_another_basis_shares_are_not_denoised_again(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, factor: int

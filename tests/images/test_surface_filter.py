@@ -8,6 +8,7 @@ import pytest
 from nightly import nightly
 
 from lightpaint.images.denoiser import DARKEST, Features
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.images.surface_filter import (
     BAND_ROWS,
     BEND,
@@ -132,6 +133,17 @@ def test_even_light_stays_as_it_is_on_any_surface(rng: np.random.Generator):
     features = room(rng)
     lit_image = 3 * np.maximum(features.albedo, DARKEST)
     np.testing.assert_allclose(SurfaceFilter(features)(lit_image), lit_image, rtol=1e-5)
+
+
+@pytest.mark.parametrize("size", [SIZE, (SIZE[0] + 1, SIZE[1] + 1)])
+def test_even_light_of_blocks_comes_back_with_all_albedo(
+    size: tuple[int, int], rng: np.random.Generator
+):
+    """Grain of albedo in each pixel, which blocks of pixels have averaged, is exact again."""
+    albedo = rng.uniform(0.1, 0.9, (*size, 3)).astype(np.float32)
+    small = 3 * block_mean(albedo, 2)
+    enlarged = SurfaceFilter(wall(size, albedo=albedo)).enlarged(small, 2)
+    np.testing.assert_allclose(enlarged, 3 * albedo, rtol=1e-5)
 
 
 def test_the_unit_of_length_does_not_matter(rng: np.random.Generator):

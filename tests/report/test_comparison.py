@@ -290,6 +290,22 @@ def test_the_rest_of_a_painting_over_the_current_look_is_that_look(make_basis: A
     np.testing.assert_array_equal(picture[:, 16:], encode_display(current)[:, 16:])
 
 
+def test_a_painting_is_as_small_as_the_look_below_it():
+    """Blocks of pixels have the mean of their paint, whatever lies where nothing is painted."""
+    image, importance = np.full((4, 6, 3), 9, np.float32), np.zeros((4, 6), np.float32)
+    image[:, :3], importance[:, :3] = 0.5, 1
+    image[0, 0] = 0.9
+    target = Target("left", image, importance, everything=False)
+    look = np.full((2, 3, 3), 0.2, np.float32)
+    picture = target_picture(target, look, transform=ViewTransform())
+    dim = unpainted_look(look, transform=ViewTransform())
+    np.testing.assert_allclose(picture[0, 0], encode_display(np.full(3, 0.6)), rtol=1e-6)
+    np.testing.assert_allclose(picture[1, 0], encode_display(np.full(3, 0.5)), rtol=1e-6)
+    half = (encode_display(np.full(3, 0.5)) + dim[0, 1]) / 2
+    np.testing.assert_allclose(picture[:, 1], np.stack([half, half]), rtol=1e-6)
+    np.testing.assert_allclose(picture[:, 2], dim[:, 2])
+
+
 @pytest.mark.parametrize("weight", [0.3, 0.64, 1.0])
 def test_a_painting_is_shown_as_it_was_painted_however_little_it_counts(
     make_basis: Any, weight: float

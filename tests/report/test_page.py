@@ -19,6 +19,8 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
+from lightpaint.report.answer_pictures import CleanLooks
+from lightpaint.report.comparison import comparison_image
 from lightpaint.report.measures import (
     ReportedAnswer,
     energy_shares,
@@ -154,6 +156,37 @@ def test_every_picture_has_its_size_and_words(make_basis: Any):
         height, width, _ = _decoded(image["src"]).shape
         assert (int(image["height"]), int(image["width"])) == (height, width) == SIZE
         assert len(image["alt"]) > 10
+
+
+def test_pictures_of_a_wide_film_are_no_larger_than_shown(make_basis: Any):
+    """All but the lights' small pictures, each of which has blocks of 2 × 2 pixels."""
+    basis = make_basis(2, (24, 1300))
+    target = Target("t", basis.current_look * 2, np.ones((24, 1300), np.float32), everything=True)
+    solution = solve(basis, target)
+    predicted = combine(basis, solution.lighting)
+    answer = ReportedAnswer(
+        basis=basis,
+        target=target,
+        solution=solution,
+        predicted=predicted,
+        verification=None,
+        command="",
+    )
+    clean = CleanLooks.clean(basis, solution.weights, predicted.image, None, factor=2)
+    for looks in (None, clean):
+        page = Page(report_page(answer, looks=looks))
+        sizes = [_decoded(image["src"]).shape[:2] for image in page.all("img")]
+        assert set(sizes[:5]) == {(12, 650)}
+        assert max(width for _, width in sizes) == 650
+        sheet = comparison_image(
+            basis=basis,
+            target=target,
+            solution=solution,
+            predicted=predicted.image,
+            verified=None,
+            looks=looks,
+        )
+        assert 3 * 650 < sheet.shape[1] < 3 * 650 + 5 * 54
 
 
 def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):

@@ -20,14 +20,27 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.cache import basis_cache
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
+from lightpaint.basis.denoised_mixes import (
+    MixQuality,
+    denoise_current_look,
+    denoise_plane,
+    share_of_clean,
+)
 from lightpaint.basis.file.file_parts import plane_sets
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.plane_results import file_content
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
-from lightpaint.images import block_mean, blocks_in, denoiser_text, oidn_is_installed, resampled
+from lightpaint.images import (
+    Size,
+    block_mean,
+    blocks_in,
+    denoiser_text,
+    oidn_is_installed,
+    resampled,
+    whole_factor,
+)
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
@@ -64,7 +77,8 @@ class DenoisedPlanes:
     halves: (n, h, w, 3) float16, linear, at unit emission divided by `scales`; h and w are smaller
     if they are means over blocks of pixels. scales: (n,), powers of 2. current: (h, w, 3) float32,
     the scene in its current state: the sum of the planes, or the denoised sum if that was shown
-    first, so that a painter continues from the picture on screen.
+    first, so that a painter continues from the picture on screen. Beside planes of blocks it may be
+    of blocks, too, which are smaller.
     """
 
     halves: Halves
@@ -80,6 +94,13 @@ class DenoisedPlanes:
     def is_whole(self) -> bool:
         """True if the planes have all pixels; False if they are means over blocks."""
         return self.halves.shape[1:] == self.current.shape
+
+    def look(self, size: Size) -> Floats | None:
+        """Return the current look at a size, (height, width), of whole blocks of its pixels; None
+        if it has none of these.
+        """
+        factor = whole_factor(self.current.shape[:2], size)
+        return None if factor is None else block_mean(self.current, factor)
 
     def mix(self, weights: Doubles) -> Floats:
         """Return Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
@@ -177,23 +198,28 @@ def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
     return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
 
 
-def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
+def obtain_denoised_planes(
+    basis: Basis, *, factor: int = 1, look_factor: int = 1
+) -> DenoisedPlanes | None:
     """Return the denoised planes, from the cache or computed and cached now.
 
-    factor: side of the blocks of pixels whose means are denoised, which costs accordingly less; if
-    whole planes are cached, these are returned. None if Open Image Denoise is not installed, or if
-    there are so few pixels that denoising their sum is faster. Planes that another basis shares, as
-    before a lamp was moved, are taken from its file.
+    factor: side of the blocks of pixels whose means are denoised, coarsely, which costs accordingly
+    less; if whole planes are cached, these are returned. look_factor: side of the blocks of the
+    current look beside such planes. None if Open Image Denoise is not installed, or if there are so
+    few pixels that denoising their sum is faster. Planes that another basis shares, as before a
+    lamp was moved, are taken from its file; but not blocks of a basis that has a file itself, since
+    to compare all its pixels takes longer.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    planes = _read(basis, factor)
+    planes = _read(basis, factor, look_factor)
     if planes is None:
-        keys = _content_keys(basis)
-        shared = _read_shared(basis, keys, factor)
+        keys = [] if factor > 1 and _file_key(basis) else _content_keys(basis)
+        shared = _read_shared(basis, keys, factor) if keys else {}
+        quality: MixQuality = "fast" if factor == 1 else "coarse"
         pairs = [
-            shared[k] if k in shared else denoise_to_halves(basis, k, factor)
+            shared[k] if k in shared else denoise_to_halves(basis, k, factor, quality=quality)
             for k in with_progress(range(len(basis.lights)), "lights")
         ]
         halves, scales = zip(*pairs, strict=True)
@@ -201,31 +227,39 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
         if factor == 1:
             planes = DenoisedPlanes.of(basis, *denoised)
         else:
-            planes = DenoisedPlanes(*denoised, denoise_current_look(replace(basis, former=None)))
+            look = denoise_current_look(
+                replace(basis, former=None), factor=look_factor, quality=quality
+            )
+            planes = DenoisedPlanes(*denoised, look)
         _write(basis, keys, planes)
     return planes
 
 
-def denoise_to_halves(basis: Basis, k: int, factor: int = 1) -> tuple[Halves, float]:
+def denoise_to_halves(
+    basis: Basis, k: int, factor: int = 1, *, quality: MixQuality = "fast"
+) -> tuple[Halves, float]:
     """Return the denoised plane of light k in the form of `DenoisedPlanes.halves`, and its
     scale.
     """
     scale = scale_of(basis.planes.plane(k))
-    return as_halves(denoise_plane(basis, k, factor=factor), scale), scale
+    return as_halves(denoise_plane(basis, k, factor=factor, quality=quality), scale), scale
 
 
-def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
+def read_denoised_planes(
+    basis: Basis, *, factor: int = 1, look_factor: int = 1
+) -> DenoisedPlanes | None:
     """Return the cached denoised planes of exactly this basis; None if missing or damaged.
 
-    factor: side of blocks; planes of such blocks are accepted as well as whole planes.
+    factor: side of blocks; planes of such blocks are accepted as well as whole planes. look_factor:
+    side of the blocks of the current look beside planes of blocks.
     """
     with suppress(OSError, LightpaintError):
         if not basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX).exists():
             return None  # before all planes are read for their keys
-    return _read(basis, factor)
+    return _read(basis, factor, look_factor)
 
 
-def _read(basis: Basis, factor: int) -> DenoisedPlanes | None:
+def _read(basis: Basis, factor: int, look_factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
         path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
         if not basis_cache.is_own(path):
@@ -235,10 +269,10 @@ def _read(basis: Basis, factor: int) -> DenoisedPlanes | None:
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
         arrays: list[Any] = [planes.halves, planes.scales, planes.current]
-        n, of_halves = len(basis.lights), [_shape(basis)]
+        n, shapes = len(basis.lights), [[_shape(basis), (len(basis.lights),), (*basis.size, 3)]]
         if factor > 1:
-            of_halves.append((n, *blocks_in(basis.size, factor), 3))
-        shapes = [[shape, (n,), _shape(basis)[1:]] for shape in of_halves]
+            of_planes, of_look = (blocks_in(basis.size, x) for x in (factor, look_factor))
+            shapes.append([(n, *of_planes, 3), (n,), (*of_look, 3)])
         types = ["float16", "float64", "float32"]
         if [x.shape for x in arrays] in shapes and [x.dtype.name for x in arrays] == types:
             path.touch()
@@ -253,7 +287,8 @@ def _is_made_of(file_arrays: Mapping[str, npt.NDArray[Any]], basis: Basis) -> bo
     key = _file_key(basis)
     if key and "of_file" in file_arrays and str(file_arrays["of_file"]) == key:
         return True
-    return bool(file_arrays["made_of"].tolist() == _content_keys(basis))
+    made_of = file_arrays["made_of"].tolist()
+    return bool(made_of) and bool(made_of == _content_keys(basis))
 
 
 def _read_shared(basis: Basis, keys: list[str], factor: int) -> dict[int, tuple[Halves, float]]:

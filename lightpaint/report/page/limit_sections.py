@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, luminance, to_8_bit
 from lightpaint.display_text import some_names
-from lightpaint.images import block_mean, by_bands, denoised
+from lightpaint.images import Size, block_mean, by_bands, denoised, whole_factor
 from lightpaint.report import answer_pictures, diagnosis_sentences
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.measures import brightness, energy_shares, relative_errors, relative_residual
@@ -359,15 +359,14 @@ def _maps(
             )
         )
     if diagnosis.ignored > 0:
-        figures.append(_ignored_map(diagnosis, limit))
+        figures.append(_ignored_map(diagnosis.ignored_map, limit, current.shape[:2]))
     return figures
 
 
-def _ignored_map(diagnosis: lighting.Diagnosis, limit: float) -> Markup:
-    """Return the figure of the error that does not count. limit: of the scale."""
-    colours = by_bands(
-        lambda x: to_8_bit(answer_pictures.diverging(-x / limit)), diagnosis.ignored_map
-    )
+def _ignored_map(ignored: Floats, limit: float, size: Size) -> Markup:
+    """Return the figure of the error that does not count, at a size. limit: of the scale."""
+    small = block_mean(ignored, whole_factor(ignored.shape, size) or 1)
+    colours = by_bands(lambda x: to_8_bit(answer_pictures.diverging(-x / limit)), small)
     return figure(
         PagePicture("Not counted", "False-colour map of what does not count.", colours),
         "The difference where the importance is small.",

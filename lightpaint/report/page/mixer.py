@@ -28,7 +28,15 @@ from lightpaint.basis import (
     light_images,
     make_once,
 )
-from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
+from lightpaint.images import (
+    PackedPicture,
+    Size,
+    block_mean,
+    in_turns,
+    pack_picture,
+    resampled,
+    whole_factor,
+)
 from lightpaint.lighting import ALL_REACHED, Lighting, lighting_fields
 from lightpaint.progress import with_progress
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, page_reduction
@@ -125,7 +133,6 @@ def mixer_html(
     shown, joint = rows_of_mixer(basis, lighting)
     options: PlaneOptions = {"is_clean": is_clean, "max_pixels": max_pixels}
     size, planes = _shown_planes(basis, lighting, shown, joint, **options)
-    factor = page_reduction(basis, len(planes), max_pixels=max_pixels)
     transform = transform or colour.ViewTransform()
     data = {
         "size": size,
@@ -135,7 +142,7 @@ def mixer_html(
         "kelvins": kelvin_colors(),
         "gels": packed_gels(),
         "transform": transform_data(transform),
-        "painting": None if painting is None else _painting(painting, factor),
+        "painting": None if painting is None else _painting(painting, (size[0], size[1])),
         "lighting": lighting_data(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
@@ -200,9 +207,11 @@ def _compact_planes(
 
     if must_denoise:  # by a denoiser that uses all processors itself
         pictures = [
-            denoise_plane(basis, k, factor=factor) for k in with_progress(lights.tolist(), "planes")
+            denoise_plane(basis, k, factor=factor, quality="coarse")
+            for k in with_progress(lights.tolist(), "planes")
         ]
-        pictures += denoise_mixes(basis, mixes, factor=factor) if mixes else []
+        if mixes:
+            pictures += denoise_mixes(basis, mixes, factor=factor, quality="coarse")
     else:
         pictures = in_turns(plane, range(len(lights)), basis.size, unit="planes")
         if planes is not None:
@@ -268,8 +277,13 @@ def transform_data(transform: colour.ViewTransform) -> dict[str, Any]:
     return {**data, "curve": curve, "lattice": lattice}
 
 
-def _painting(painting: Floats, factor: int) -> str:
-    small = block_mean(np.asarray(painting, np.float32), factor)
+def _painting(painting: Floats, size: Size) -> str:
+    """Return a picture of the film, possibly reduced, at the size of the planes."""
+    factor = whole_factor(painting.shape[:2], size)
+    if factor is None:
+        small = resampled(painting, size)
+    else:
+        small = block_mean(np.asarray(painting, np.float32), factor)
     return data_uri(colour.to_8_bit(np.clip(small, 0, 1)))
 
 

@@ -26,7 +26,7 @@ from lightpaint.images import Estimate, covered, in_turns
 from lightpaint.photometry import false_colours, plane_title
 from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
 from lightpaint.report import answer_pictures, diagnosis_sentences, measures, planes_text
-from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, look_reduction
 from lightpaint.report.page import limit_sections
 from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
 from lightpaint.report.page.html import facts, html, name_list
@@ -51,7 +51,8 @@ def report_page(
 ) -> str:
     """Return the page as HTML text.
 
-    looks: the pictures without their grain, which a switch then shows. missed: the result of
+    looks: the pictures without their grain, which a switch then shows, reduced by `look_reduction`.
+    missed: the result of
     `residual_of`.
 
     Raises SizeError if target and basis differ in size.
@@ -60,7 +61,8 @@ def report_page(
     answer = replace(answer, target=answer.target.fitted_to(basis.size, resize=False))
     verification = answer.verification
     verified = None if verification is None else verification.verified.image
-    raw = answer_pictures.CleanLooks.raw(basis, predicted.image, verified)
+    factor = look_reduction(basis.size)
+    raw = answer_pictures.CleanLooks.raw(basis, predicted.image, verified, factor=factor)
     looks = looks or raw
     transform = looks.encoder(
         answer_pictures.report_transform(answer.target, basis, predicted.image)
@@ -113,7 +115,7 @@ def report_page(
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         wishes=wishes_section(answer.appearance),
         planes=planes_section(answer.planes),
-        places=placement_section(answer.hung, shown_answer, basis.features),
+        places=placement_section(answer.hung, shown_answer, basis.surfaces(factor)[0]),
         suggestions=suggestion_section(
             answer.suggestions,
             turn=answer.turn,
