@@ -8,6 +8,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.colour import LUMINANCE
+from lightpaint.images.formats import compression_errors
 
 #: Share of the beauty that may be missing beyond rounding without being reported.
 NEGLIGIBLE_SHARE = 1e-5
@@ -127,7 +128,10 @@ def _rounded(image: Floats, layer: RenderLayer) -> Floats:
     """Return an upper bound of the rounding error of pixels of a layer, (h, w, 3)."""
     size = np.abs(np.nan_to_num(image.astype(np.float64), posinf=0, neginf=0))
     bound = (size * HALF_PRECISION + SUBNORMAL if layer.is_half else 0) + size * SUM_PRECISION
-    return np.asarray(bound + layer.loss * _brightest_in_block(size) if layer.loss else bound)
+    if layer.loss:
+        brightest = _brightest_in_block(size)
+        bound = bound + compression_errors(layer.compression, layer.loss, brightest)
+    return np.asarray(bound)
 
 
 def _brightest_in_block(size: Floats) -> Floats:

@@ -8,8 +8,8 @@ if TYPE_CHECKING:
     # fmt: off
     from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, light_of_integers
     from lightpaint.images.formats.exr import (
-        OWN_PREFIX, Channels, ExrPart, read_channels, read_headers, read_parts, rgb_channels,
-        write_parts, write_rgb,
+        OWN_PREFIX, Channels, ExrPart, compression_errors, read_channels, read_headers, read_parts,
+        rgb_channels, write_parts, write_rgb,
     )
     from lightpaint.images.formats.exr_layers import (
         ALPHA_NAMES, KRITA_LAYERS, channel_named, colour_channels, primaries_of, vector_channels,

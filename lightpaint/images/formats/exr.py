@@ -36,13 +36,16 @@ MAX_COMPRESSION = 64
 #: they shrink below this share.
 SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
-#: Largest relative error of lossy compressions, as a share of the brightest value in the block of
-#: pixels that is compressed at once: measured on smooth, noisy and sparse images, of which 2e-4 of
-#: all light lies beyond. The figure of DWA is for its default level, to which it is proportional.
+#: Largest error of lossy compressions, as a share of the brightest value in the block of pixels
+#: that is compressed at once: measured on smooth, noisy and sparse images, of which 2e-4 of all
+#: light lies beyond. Of those in CURVED, which quantise x^(1 / CURVE_POWER) below 1, log x above,
+#: it is the share at 1; in the dark it is larger. The figure of DWA is for its default level, to
+#: which it is proportional, down to the rounding along its curve.
 COMPRESSION_LOSS = {
     **{"PXR24": 2.0**-16, "B44": 0.04, "B44A": 0.04},
     **{"DWAA": 0.02, "DWAB": 0.02, "LJ2K": 0.02},
 }
+CURVED, CURVE_POWER, CURVE_ROUNDING = ("DWAA", "DWAB", "LJ2K"), 2.2, 2.0**-9
 DWA_LEVEL_KEY, DEFAULT_DWA_LEVEL = "dwaCompressionLevel", 45.0
 
 #: Arrays (height, width) by channel name.
@@ -65,7 +68,7 @@ class ExrPart:
     origin: (y, x) of that pixel in the coordinates of the file, whose window may begin anywhere.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
     views: names of the views in the part, beginning with the one whose channels have no prefix.
-    compression: its name. loss: its largest relative error, as in COMPRESSION_LOSS; 0 if lossless.
+    compression: its name. loss: its largest error, as in COMPRESSION_LOSS; 0 if lossless.
     """
 
     name: str
@@ -219,9 +222,19 @@ def _compression(header: Mapping[str, Any]) -> tuple[str, float]:
     name = getattr(header.get("compression"), "name", "").removesuffix("_COMPRESSION")
     loss = COMPRESSION_LOSS.get(name, 0.0)
     level = header.get(DWA_LEVEL_KEY, DEFAULT_DWA_LEVEL)
-    if name.startswith("DWA") and isinstance(level, int | float) and level > 0:
-        loss = min(loss * float(level) / DEFAULT_DWA_LEVEL, 1.0)
+    if name.startswith("DWA") and isinstance(level, int | float) and level >= 0:
+        loss = min(max(loss * float(level) / DEFAULT_DWA_LEVEL, CURVE_ROUNDING), 1.0)
     return name, loss
+
+
+def compression_errors(compression: str, loss: float, brightest: Floats) -> Floats:
+    """Return the largest errors of a compression, (h, w, 3), where the brightest value of each
+    block of pixels is `brightest`, at least 0. loss: as in ExrPart.
+    """
+    if compression in CURVED:  # the inverse of the slope of its curve
+        dark = np.power(np.minimum(brightest, 1), 1 - 1 / CURVE_POWER)
+        brightest = np.maximum(brightest, dark)
+    return np.asarray(loss * brightest)
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:

@@ -109,16 +109,25 @@ def test_every_layer_is_gone_through_a_few_times_however_many_there_are():
 
 
 def _lossy_layers(
-    path: Path, compression: str, kind: Any, extra: float, *, is_even: bool = False
+    path: Path,
+    compression: str,
+    kind: Any,
+    extra: float,
+    *,
+    is_even: bool = False,
+    light: float = 1,
+    level: float | None = None,
 ) -> dict[str, Any]:
     """Layers with grain, and one light of a hundredth of the picture in a corner, in no group.
 
     is_even: whether it shines on all that the others do, in proportion, where it hides best.
+    light: a factor of all. level: of DWA.
     """
     rng = np.random.default_rng(3)
     y, x = (side[..., None] for side in np.mgrid[:64, :96])
     smooth = [np.exp(np.sin(x / a) + np.cos(y / b)) for a, b in ((9, 14), (17, 8), (30, 30))]
-    images = np.stack([s * rng.gamma(9, 1 / 9, (64, 96, 3)) for s in smooth]).astype(np.float32)
+    images = np.stack([light * s * rng.gamma(9, 1 / 9, (64, 96, 3)) for s in smooth])
+    images = images.astype(np.float32)
     corner = np.zeros_like(images[0])
     corner[:16, :16] = extra * images.sum() / (16 * 16 * 3)
     if is_even:
@@ -126,6 +135,7 @@ def _lossy_layers(
     layers = {"Combined": images.sum(axis=0) + corner}
     layers |= {f"Combined_{name}": image for name, image in zip("abc", images, strict=True)}
     header = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
+    header |= {} if level is None else {"dwaCompressionLevel": level}
     return {"path": interleaved(path / "a.exr", layers, kind=kind, header=header)}
 
 
@@ -158,6 +168,25 @@ def test_what_lossy_compression_changes_is_not_missing(tmp_path: Path, compressi
     share = 1.02 * float(hidden) / 100  # of the beauty, of which two digits are shown
     larger = _lossy_layers(tmp_path, compression, kind, extra=share / (1 - share), is_even=True)
     assert read_light_groups(**larger).has_rest
+
+
+@pytest.mark.parametrize("compression", ["DWAA", "DWAB", "LJ2K", "B44"])
+@pytest.mark.parametrize("light", [1e-3, 1e-2, 0.1, 100])
+def test_compression_loses_more_of_dark_pictures(tmp_path: Path, compression: str, light: float):
+    """Those that quantise along a curve as eyes see; B44 keeps shares."""
+    groups = read_light_groups(**_lossy_layers(tmp_path, compression, np.float16, 0, light=light))
+    assert not groups.has_rest
+    dark = _lossy_layers(tmp_path, compression, np.float16, extra=0.6, light=light)
+    assert read_light_groups(**dark).has_rest
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 10.0, 200.0])
+@pytest.mark.parametrize("light", [1e-3, 1, 1000])
+def test_what_dwa_loses_grows_with_its_level(tmp_path: Path, level: float, light: float):
+    kinds = {"compression": "DWAB", "kind": np.float16, "light": light, "level": level}
+    groups = read_light_groups(**_lossy_layers(tmp_path, extra=0, **kinds))
+    assert not groups.has_rest
+    assert any("the lossy compression DWAB" in x for x in groups.remarks)
 
 
 @pytest.mark.parametrize(
