@@ -12,9 +12,8 @@ import numpy as np
 from lightpaint.basis import Basis, LightGroups, Lights, meter_exposure
 from lightpaint.basis.cache import SceneFacts, basis_cache, find_opening, scene_facts
 from lightpaint.colour import TransformChoice, ViewTransform, read_observer
-from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
-from lightpaint.files import is_name, one_line, scene_name
+from lightpaint.files import scene_name
 from lightpaint.lighting import Constraints
 from lightpaint.paint.layers.layer_files import read_layers
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
@@ -399,13 +398,8 @@ def session_identity(
 
 
 def check_view_names(sensors: Sequence[str]) -> None:
-    """Raise PaintError unless several views have distinct names that are valid file names."""
-    if len(sensors) == 1:
-        return
-    if len(set(sensors)) < len(sensors):
-        raise PaintError(f"a view is there twice: {some_names(sensors)}; give each sensor once")
-    for name in sensors:
-        if not is_name(name):
-            raise PaintError(
-                f"the sensor id {one_line(repr(name))} cannot name a file: choose another id"
-            )
+    """Raise PaintError unless several views have distinct names that are valid names of folders."""
+    if len(sensors) > 1:
+        from lightpaint.pipeline import checked_names
+
+        checked_names([*sensors], PaintError)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job_bases import Certainty, needed_counts, obtain
     from lightpaint.pipeline.job_run import run
     from lightpaint.pipeline.look import (
-        Look, hung_of, result_folders, verify_result, view_names, write_predicted,
+        Look, checked_names, hung_of, result_folders, verify_result, view_names, write_predicted,
     )
     from lightpaint.pipeline.one_call import paint_with_light
     from lightpaint.pipeline.placed_lights import find_places, moved_basis, say_changes

@@ -10,7 +10,7 @@ from lightpaint import report
 from lightpaint.basis import Basis, Origin
 from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import rounded_text, some_names
-from lightpaint.errors import ImageError, OutputError, SceneError
+from lightpaint.errors import ImageError, LightpaintError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images import Estimate, Size, in_turns, read_estimate, whole_factor, write_estimate
 from lightpaint.images.formats import png_bytes
@@ -165,13 +165,13 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     return checked_names([scene.sensor_names[scene.sensor] for scene in scenes])
 
 
-def checked_names(names: list[str]) -> list[str]:
-    """Return the names of views. Raises SceneError for one that cannot name a folder of its own."""
+def checked_names(names: list[str], error: type[LightpaintError] = SceneError) -> list[str]:
+    """Return the names of views. Raises `error` for one that cannot name a folder of its own."""
     if len(set(names)) < len(names):
-        raise SceneError(f"a view is given twice: {some_names(names)}; give each sensor once")
+        raise error(f"a view is given twice: {some_names(names)}; give each sensor once")
     for name in names:
         if not is_name(name):
-            raise SceneError(
+            raise error(
                 f"the sensor id {one_line(repr(name))} cannot name a folder: choose another id"
             )
     return names

@@ -131,7 +131,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("room.basis.exr room.basis.exr", "a view is there twice"),
+        ("room.basis.exr room.basis.exr", "a view is given twice"),
         ("room.basis.exr groups.exr", "several must be bases of the views of one scene"),
         ("scene.xml room.basis.exr", "for views of a scene repeat --sensor"),
         ("room.basis.exr -s a", "-s cannot change a saved basis|--sensor"),

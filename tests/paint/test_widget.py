@@ -350,7 +350,7 @@ def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> No
     with pytest.raises(lp.LightpaintError, match=r"painter.targets is a list of 2"):
         painter.targets = [None]
     painter.close()
-    for views, message in (([basis, basis], "a view is there twice"), ([], "at least one view")):
+    for views, message in (([basis, basis], "a view is given twice"), ([], "at least one view")):
         with pytest.raises(lp.LightpaintError, match=message):
             lp.Painter(views)
 
