@@ -11,7 +11,8 @@ if TYPE_CHECKING:
         obtain_denoised_planes, read_denoised_planes, scale_of,
     )
     from lightpaint.basis.denoised_mixes import (
-        MixQuality, denoise_current_look, denoise_mix, denoise_mixes, denoise_plane,
+        MixQuality, denoise_current_look, denoise_mix, denoise_mixes, denoise_plane, read_look,
+        read_look_noise,
     )
     from lightpaint.basis.derived_planes import (
         PlaneReference, block_means, compose_planes, in_one_row,

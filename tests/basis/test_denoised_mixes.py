@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.cache.denoised_planes import RoughPlanes
-from lightpaint.basis.denoised_mixes import blend_by_noise, denoise_mix, denoise_plane
+from lightpaint.basis.denoised_mixes import (
+    READ_SIDE,
+    blend_by_noise,
+    denoise_mix,
+    denoise_plane,
+    read_look,
+    read_look_noise,
+)
 from lightpaint.basis.file.basis_file import as_stored, read_basis, write_basis
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
@@ -294,6 +301,41 @@ def test_indirect_light_is_of_the_lights_of_its_basis(make_basis: Any):
     other = as_planes(np.zeros((3, *SIZE, 3), np.float32))
     with pytest.raises(BasisError, match="indirect light and images differ in shape"):
         replace(basis, indirect=IndirectLight(other, other))
+
+
+@pytest.mark.parametrize("has_denoiser", [True, False])
+def test_the_look_that_is_read_has_little_noise_in_blocks_and_keeps_single_pixels(
+    has_denoiser: bool, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    """Its own estimate of what is left, and the errors against the truth, agree over many draws."""
+    if has_denoiser and not oidn_is_installed():
+        pytest.skip("Open Image Denoise")
+    monkeypatch.setattr("lightpaint.basis.denoised_mixes.oidn_is_installed", lambda: has_denoiser)
+    pools, glow = pools_and_glow()
+    side, error, raw, stated = 6, 0.0, 0.0, 0.0
+    for _ in range(8):
+        basis = replace(split_basis(pools, glow, rng), features=wall())
+        look, noise = read_look(basis), read_look_noise(basis)
+        change = look - basis.current_look
+        blocks = block_mean(change, READ_SIDE).repeat(READ_SIDE, axis=0).repeat(READ_SIDE, axis=1)
+        # Pixels of a block change alike: what is left is round-off.
+        np.testing.assert_allclose(change, blocks, atol=1e-6)
+        off = (block_mean(x - pools - glow, side) for x in (look, basis.current_look))
+        error, raw = (
+            float(e + np.square(x).mean()) for e, x in zip((error, raw), off, strict=True)
+        )
+        stated += float(np.square(block_mean(noise, side)).mean())
+    assert error < 0.3 * raw
+    # The denoiser has a bias of its own, and its answers to both halves are not independent.
+    assert 0.5 < stated / error < 1.5
+
+
+def test_without_known_parts_the_look_is_read_as_it_is(rng: np.random.Generator):
+    pools, glow = pools_and_glow()
+    split = split_basis(pools, glow, rng)
+    for basis in (split, replace(split, features=wall(), indirect=None)):
+        assert read_look(basis) is basis.current_look
+        np.testing.assert_array_equal(read_look_noise(basis), basis.current_noise)
 
 
 def test_a_file_keeps_it(tmp_path: Path, rng: np.random.Generator):

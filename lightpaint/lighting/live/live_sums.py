@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
-from lightpaint.basis import Basis, Planes, array_name, array_once
+from lightpaint.basis import Basis, Planes, array_name, array_once, read_look
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.step_search import search_step
@@ -148,6 +148,7 @@ class SmallFilm:
         if basis.features is not None:
             self.albedo = _planes(self.average(basis.features.albedo))
         self._current = _planes(self.average(basis.current_look))
+        self._read_look = self.average(read_look(basis))
         self._painted = self._current.copy()
         # The paint as the wash averages it: importance beyond 1 is no larger cover.
         self._washed = self._current.copy()
@@ -317,7 +318,7 @@ class SmallFilm:
         if is_sketch and self._marks.any():
             marks = self._marks.T.reshape(*self._size, 3)
             painted = extend_marked(painted, small_importance, marks, wishes, look)
-        shares = wish_shares(wishes, painted, small_importance, look)
+        shares = wish_shares(wishes, painted, small_importance, self._read_look)
         exact = joint_cover([x for x in wishes if x.is_exact], self._size)
         strokes = joint_cover([x for x in wishes if x.has_strokes], self._size)
         places = wish_places(shares, self._size)

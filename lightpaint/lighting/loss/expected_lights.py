@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis import Basis, Planes, block_means
+from lightpaint.basis import Basis, Planes, block_means, read_look, read_look_noise
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
 from lightpaint.target import Target, Wish, extend_saturated, number_places, split_wishes
@@ -200,13 +200,15 @@ class PaintedBlocks:
     """A view averaged over blocks of pixels, before its wishes are found.
 
     rows: (3, n, p), Φ. painted, look: (h, w, 3), linear. importance, counts: (h, w), as in `Wash`.
-    layers: the wishes of a painting with layers, with an area of a value for each block. flames:
-    its wishes for emitters in view.
+    read_look: (h, w, 3), the look with little noise, under which wishes are found. layers: the
+    wishes of a painting with layers, with an area of a value for each block. flames: its wishes for
+    emitters in view.
     """
 
     rows: Floats
     painted: Floats
     look: Floats
+    read_look: Floats
     importance: Doubles
     counts: Doubles
     layers: Sequence[Wish]
@@ -219,7 +221,9 @@ class PaintedBlocks:
         counted = _counted_pixels(basis)
         weight = np.minimum(target.importance, 1) * counted
         counts, painted_counts = block_sums(counted, side), block_sums(weight, side)
-        look = _weighted_means(basis.current_look, counted, side)
+        look, clean = (
+            _weighted_means(x, counted, side) for x in (basis.current_look, read_look(basis))
+        )
         importance = painted_counts / np.where(counts > 0, counts, 1)
         # Where nothing is painted, nothing is asked for.
         image = extend_saturated(target, basis.current_look)
@@ -233,12 +237,12 @@ class PaintedBlocks:
         seen = basis.emitters_seen
         flames = FlameWishes.of(basis.planes, seen, target.image, target.importance, target.wishes)
         rows = light_rows(basis.planes, counted, side)
-        return cls(rows, painted, look, importance, counts, layers, flames)
+        return cls(rows, painted, look, clean, importance, counts, layers, flames)
 
     @property
     def wash(self) -> Wash:
         """The wash of the view, with its wishes."""
-        wishes = wish_shares(self.layers, self.painted, self.importance, self.look)
+        wishes = wish_shares(self.layers, self.painted, self.importance, self.read_look)
         return Wash(
             self.rows,
             self.painted.reshape(-1, 3).T,
@@ -258,12 +262,13 @@ class PaintedBlocks:
 class NoisyBlocks:
     """The blocks of a view, and the half differences of their light and of the look.
 
-    noise: (3, n, p). look_noise: (h, w, 3).
+    noise: (3, n, p). look_noise, read_noise: (h, w, 3), of the look and of the one that is read.
     """
 
     blocks: PaintedBlocks
     noise: Floats
     look_noise: Floats
+    read_noise: Floats
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> Self:
@@ -272,7 +277,10 @@ class NoisyBlocks:
         return cls(
             PaintedBlocks.of(basis, target),
             light_rows(basis.noise, counted, side),
-            _weighted_means(basis.current_noise, counted, side),
+            *(
+                _weighted_means(x, counted, side)
+                for x in (basis.current_noise, read_look_noise(basis))
+            ),
         )
 
     def disturbed(self, rng: np.random.Generator) -> tuple[Wash, Wash]:
@@ -285,6 +293,7 @@ class NoisyBlocks:
                 self.blocks,
                 rows=self.blocks.rows + x.ravel() * self.noise,
                 look=self.blocks.look + x[..., None] * self.look_noise,
+                read_look=self.blocks.read_look + x[..., None] * self.read_noise,
             ).wash
             for x in (signs, -signs)
         )

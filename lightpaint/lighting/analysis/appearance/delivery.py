@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.basis import read_look
 from lightpaint.colour import ViewTransform, ciede2000, lab, luminance
 from lightpaint.display_text import visible
 from lightpaint.images import grown
@@ -288,7 +289,7 @@ def measure_deliveries(solution: Solution, picture: Floats) -> DeliveryReport:
     basis, transform = solution.basis, display_transform(solution.problem)
     views = painted_views(solution, basis.current_look, picture)
     parts = [
-        wish_parts(find_wishes(view.target, view.now), own_basis.objects)
+        wish_parts(find_wishes(view.target, read_look(own_basis)), own_basis.objects)
         for view, own_basis in zip(views, solution.problem.views.bases, strict=True)
     ]
     report = _measure_parts(views, parts, transform)

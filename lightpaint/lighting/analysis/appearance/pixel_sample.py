@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis import Basis, block_means
+from lightpaint.basis import Basis, block_means, read_look
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.held_answer import answer_released
@@ -282,7 +282,7 @@ def _cropped(image: Floats, counts: Doubles) -> Floats:
 
 def _with_wishes(target: Target, basis: Basis) -> Target:
     """Return the target with its wishes separated, which takes pixels at their places."""
-    found = find_wishes(target, basis.current_look)
+    found = find_wishes(target, read_look(basis))
     return replace(target, wishes=tuple(replace(wish, has_strokes=False) for wish in found))
 
 
