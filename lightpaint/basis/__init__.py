@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from lightpaint.basis.plane_results import array_name, array_once, make_once
     from lightpaint.basis.planes import (
         BLOCK_PIXELS, FEW_LIGHTS, IndirectLight, LitEntries, MemoryPlanes, Planes, Rooms, as_planes,
-        as_slice, block_of, blocks_of, joined_planes, mix_channels, thinned,
+        as_slice, block_of, blocks_of, joined_planes, mix_channels, thinned, walked_blocks,
     )
     from lightpaint.basis.working_primaries import multipliers_in
     # fmt: on

@@ -194,11 +194,10 @@ class PlanesBase:
         pixels = self.size[0] * self.size[1]
         mixed = np.empty((3, pixels))
 
-        def fill(start: int) -> None:
-            block = slice(start, min(start + BLOCK_PIXELS, pixels))
+        def fill(block: slice) -> None:
             mixed[:, block] = mix_channels(self.pixels(block), weights)
 
-        parallel_map(fill, range(0, pixels, BLOCK_PIXELS), unit="blocks")
+        parallel_map(fill, walked_blocks(self, pixels), unit="blocks")
         return mixed
 
     @one_thread()
@@ -434,6 +433,14 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64
     return BLOCK_PIXELS // (2 if planes.count < LARGE_BLOCK_LIGHTS else 4), np.float32
+
+
+def walked_blocks(planes: "Planes | PlanesBase", stop: int, start: int = 0) -> list[slice]:
+    """Return the parts of consecutive pixels of which the light of all planes, in float64 as well,
+    is in memory at a time, by each thread.
+    """
+    step = BLOCK_PIXELS // (1 if planes.count < LARGE_BLOCK_LIGHTS else 8)
+    return [slice(first, min(first + step, stop)) for first in range(start, stop, step)]
 
 
 def blocks_of(planes: "Planes | PlanesBase", counted: Indices) -> list[Indices]:

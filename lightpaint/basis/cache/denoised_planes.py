@@ -195,7 +195,8 @@ def scale_of(plane: Floats) -> float:
 
 def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
     """Return light as half floats, clipped to their range."""
-    return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
+    numbers = plane if scale == 1 else plane / np.float32(scale)
+    return np.asarray(np.clip(numbers, 0, 65504), np.float16)
 
 
 def obtain_denoised_planes(

@@ -1,13 +1,14 @@
-"""Planes of many lights in memory, of which only the lit pixels are kept.
+"""Planes of many lights, of which only the lit pixels are kept, in memory or in temporary files.
 
 A light of a thousand reaches little of a picture, and few samples find even that: five of six
 pixels are black. Each walk over the planes then takes a quarter of the time, and a tenth of the
 memory of float32.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -22,7 +23,15 @@ from lightpaint.arrays import (
     as_singles,
     release_freed_memory,
 )
-from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
+from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes, TemporaryArray
+from lightpaint.basis.file.lit_strips import (
+    LitStrip,
+    StripsInFile,
+    StripsInMemory,
+    WholePlanes,
+    mapped_array,
+    write_array,
+)
 from lightpaint.basis.planes import LitEntries
 from lightpaint.images import block_sums
 from lightpaint.progress import with_progress
@@ -36,6 +45,15 @@ MAX_LIT_SHARE = 0.25
 
 #: Maximum size in bytes of both sets of planes, images and noise, that are kept so.
 MAX_BYTES = 2**30
+
+#: Size in bytes of a set of planes up to which it stays in memory. With two larger ones, little
+#: else of a solve or a painter fits into a gigabyte; strips of a file are read in a twentieth of
+#: the time of a sum over them.
+MAX_BYTES_IN_MEMORY = 2**27
+
+#: Bytes of collected planes that go to one temporary file, and strips that are made of such planes
+#: until the pages of the files are released.
+SPOOLED_BYTES, STRIPS_PER_RELEASE = 2**26, 8
 
 
 @dataclass(frozen=True)
@@ -81,114 +99,17 @@ class LitPlane:
         return plane
 
 
-@dataclass(frozen=True)
-class _LitStrip:
-    """The lit pixels of all planes in some rows, plane by plane.
-
-    lit: (m,) uint16 or uint32, their indices in the strip. numbers: (3, m). begins: (n + 1,), where
-    the indices of each plane begin. size: number of pixels of the strip.
-    """
-
-    lit: npt.NDArray[Any]
-    numbers: npt.NDArray[Any]
-    begins: Indices
-    size: int
-
-    @classmethod
-    def of(cls, planes: Sequence[LitPlane], parts: Sequence[slice], pixels: slice) -> "_LitStrip":
-        """Return a strip of planes. parts: slices of their lit pixels. pixels: of the picture."""
-        size = pixels.stop - pixels.start
-        kind = np.uint16 if size <= 2**16 else np.uint32
-        numbers = np.concatenate([x.numbers[:, y] for x, y in zip(planes, parts, strict=True)], 1)
-        lit = np.concatenate([x.pixels[y] for x, y in zip(planes, parts, strict=True)])
-        begins = np.cumsum([0, *(part.stop - part.start for part in parts)])
-        return cls((lit - np.uint32(pixels.start)).astype(kind), numbers, begins, size)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of memory that it takes."""
-        return self.lit.nbytes + self.numbers.nbytes
-
-    def power_and_totals(self, counted: Bools) -> Doubles:
-        """Return Σ x² over the counted pixels and Σ x over all, (2, n, 3), before the scales.
-
-        counted: (pixels,).
-        """
-        is_lit = np.diff(self.begins) > 0
-        first, sums = self.begins[:-1][is_lit], np.zeros((2, len(is_lit), 3))
-        if not first.size:
-            return sums
-        is_counted = counted[self.lit]
-        for c, channel in enumerate(self.numbers):
-            values = as_singles(channel).astype(np.float64)
-            # The numbers of a plane follow each other.
-            sums[1, is_lit, c] = np.add.reduceat(values, first)
-            sums[0, is_lit, c] = np.add.reduceat(np.square(values, out=values) * is_counted, first)
-        return sums
-
-    def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
-        return np.repeat(values, np.diff(self.begins))
-
-    def decoded(self) -> npt.NDArray[np.float32]:
-        """Return the planes, (n, 3, pixels), not yet multiplied by their scales."""
-        n = len(self.begins) - 1
-        places = self.of_planes(3 * self.size * np.arange(n))
-        places += self.lit
-        block = np.zeros(3 * n * self.size, np.float32)
-        for c, channel in enumerate(self.numbers):
-            block[c * self.size :][places] = as_singles(channel)
-        return block.reshape(n, 3, self.size)
-
-    def lit_of(self, i: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Return the lit pixels of plane i and their numbers, (3, m)."""
-        part = slice(self.begins[i], self.begins[i + 1])
-        return self.lit[part], self.numbers[:, part]
-
-    def entries(self, columns: Indices) -> tuple[Indices, Indices, npt.NDArray[np.float32]]:
-        """Return lights, columns, (m,) each, and numbers, (3, m), of the pixels that have a column.
-
-        columns: (pixels,), -1 for a pixel without one.
-        """
-        lights, its_columns = self.of_planes(np.arange(len(self.begins) - 1)), columns[self.lit]
-        numbers = self.numbers
-        if columns.min(initial=0) < 0:
-            has_column = its_columns >= 0
-            lights, its_columns = lights[has_column], its_columns[has_column]
-            numbers = numbers[:, has_column]
-        return lights, its_columns, as_singles(numbers)
-
-    def sums_of_groups(self, groups: Indices, weight: Doubles, count: int) -> Doubles:
-        """Return Σ of weighted numbers over each group of pixels, (3, n, count) float64.
-
-        groups: (pixels,), the group of each pixel. weight: (pixels,).
-        """
-        n, weights = len(self.begins) - 1, weight[self.lit]
-        places = self.of_planes(count * np.arange(n)) + groups[self.lit]
-        sums = [
-            np.bincount(places, as_singles(channel) * weights, minlength=n * count)
-            for channel in self.numbers
-        ]
-        return np.reshape(sums, (3, n, count))
-
-    def mix(self, weights: Doubles) -> Doubles:
-        """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
-        from scipy.sparse import csc_array
-
-        lit, begins = self.lit.astype(np.int32), self.begins.astype(np.int32)
-        shape = self.size, len(weights)
-        channels = (as_singles(channel).astype(np.float64) for channel in self.numbers)
-        return np.stack(
-            [csc_array((x, lit, begins), shape) @ weights[:, c] for c, x in enumerate(channels)]
-        )
-
-
 class LitPlanes(RowPlanes):
     """Planes of which only the lit pixels are in memory. planes: one for each light, which are
-    copied. size: (height, width).
+    copied. size: (height, width). release: called from time to time while they are copied.
     """
 
-    def __init__(self, planes: Sequence[LitPlane], size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        planes: Sequence[LitPlane],
+        size: tuple[int, int],
+        release: Callable[[], None] = lambda: None,
+    ) -> None:
         self._count, self._size = len(planes), size
         self._scales = np.array([plane.scale for plane in planes], np.float32)
         (height, width), step = size, self.strip_rows
@@ -198,20 +119,34 @@ class LitPlanes(RowPlanes):
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
         self._is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
-        self._clean = {
-            i: plane.dense(height * width)
-            for i, plane in enumerate(planes)
-            if self._is_noisy and not is_half[i]
-        }
+        clean = [i for i in range(len(planes)) if self._is_noisy and not is_half[i]]
         kind = np.float16 if self._is_noisy else np.float32
         nothing = LitPlane(np.zeros(0, np.uint32), np.zeros((3, 0), kind), 1.0)
-        same = [nothing if i in self._clean else x.in_kind(kind) for i, x in enumerate(planes)]
+        same = [nothing if i in clean else x.in_kind(kind) for i, x in enumerate(planes)]
         # As lists, of which there are hundreds of thousands of slices.
         cuts = [np.searchsorted(x.pixels, np.array(edges, np.uint32)).tolist() for x in same]
-        self._lit = [
-            _LitStrip.of(same, [slice(cut[k], cut[k + 1]) for cut in cuts], slice(*ends))
-            for k, ends in enumerate(with_progress(list(pairwise(edges)), "strips"))
-        ]
+
+        def strips() -> Iterator[LitStrip]:
+            for k, ends in enumerate(with_progress(list(pairwise(edges)), "strips")):
+                parts = [slice(cut[k], cut[k + 1]) for cut in cuts]
+                pairs = zip(same, parts, strict=True)
+                yield LitStrip.of([(x.pixels[y], x.numbers[:, y]) for x, y in pairs], slice(*ends))
+                if k % STRIPS_PER_RELEASE == 0:
+                    release()
+
+        def keep(*, in_memory: bool) -> None:
+            whole = ((i, planes[i].dense(height * width)) for i in clean)
+            self._clean = WholePlanes(whole, len(clean), height * width, in_memory=in_memory)
+            release()
+            nbytes, count = sum(plane.nbytes for plane in same), len(edges) - 1
+            kept = StripsInMemory if in_memory else partial(StripsInFile, size=nbytes, count=count)
+            self._lit: StripsInMemory | StripsInFile = kept(strips())
+
+        total = sum(plane.nbytes for plane in same) + 12 * len(clean) * height * width
+        try:
+            keep(in_memory=total <= MAX_BYTES_IN_MEMORY)
+        except OSError:  # no room on the disk
+            keep(in_memory=True)
 
     @property
     def count(self) -> int:
@@ -226,7 +161,7 @@ class LitPlanes(RowPlanes):
     @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
-        return sum(strip.nbytes for strip in self._lit)
+        return self._lit.nbytes
 
     @property
     def is_noisy(self) -> bool:
@@ -237,9 +172,9 @@ class LitPlanes(RowPlanes):
         """Return the plane of light i as it is stored."""
         scale = float(self._scales[i])
         if i in self._clean:
-            return LitPlane.of([*self._clean[i]], scale)
+            return LitPlane.of([*self._clean.pixels(i)], scale)
         # One copy of all strips: there are many, of few lit pixels each.
-        of_strips = [strip.lit_of(i) for strip in self._lit]
+        of_strips = [self._lit.lit_of(k, i) for k in range(len(self._begins))]
         lit = [x + np.uint32(y) for (x, _), y in zip(of_strips, self._begins, strict=True)]
         return LitPlane(
             np.concatenate(lit), np.concatenate([x for _, x in of_strips], axis=1), scale
@@ -249,7 +184,7 @@ class LitPlanes(RowPlanes):
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
         pixels: slice | Indices
         if i in self._clean:
-            pixels, values = slice(None), self._clean[i].copy()
+            pixels, values = slice(None), self._clean.pixels(i).copy()
         else:
             stored = self.stored(i)
             pixels, values = stored.pixels.astype(np.intp), as_singles(stored.numbers)
@@ -287,7 +222,7 @@ class LitPlanes(RowPlanes):
     @cached_property
     def _is_mostly_black(self) -> bool:
         pixels = self._size[0] * self._size[1]
-        lit = pixels * len(self._clean) + sum(strip.lit.size for strip in self._lit)
+        lit = pixels * len(self._clean) + self._lit.lit_count
         return lit <= MAX_LIT_SHARE * self._count * pixels
 
     @property
@@ -308,11 +243,14 @@ class LitPlanes(RowPlanes):
         parts = []
         for k in np.flatnonzero(np.diff(ends)):
             inside = slice(ends[k], ends[k + 1])
-            columns = np.full(self._lit[k].size, -1)
+            strip = self._lit.strip(int(k))
+            columns = np.full(strip.size, -1)
             columns[where[inside] - self._begins[k]] = np.arange(inside.start, inside.stop)
-            parts.append(self._lit[k].entries(columns))
-        for i, plane in self._clean.items():
-            parts.append((np.full(len(where), i), np.arange(len(where)), plane[:, where]))
+            parts.append(strip.entries(columns))
+        first = int(where[0]) if len(where) else 0
+        for i in self._clean if len(where) else ():
+            plane = self._clean.pixels(i, first, int(where[-1]) + 1)
+            parts.append((np.full(len(where), i), np.arange(len(where)), plane[:, where - first]))
         lights, columns, values = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
         if (self._scales != 1).any():
             values *= self._scales[lights]
@@ -320,9 +258,9 @@ class LitPlanes(RowPlanes):
 
     def _read_strip(self, k: int) -> Floats:
         """Return a strip, (n, rows, w, 3)."""
-        block, begin = self._lit[k].decoded(), k * self.strip_rows * self._size[1]
-        for i, plane in self._clean.items():
-            block[i] = plane[:, begin : begin + block.shape[2]]
+        block, begin = self._lit.strip(k).decoded(), k * self.strip_rows * self._size[1]
+        for i in self._clean:
+            block[i] = self._clean.pixels(i, begin, begin + block.shape[2])
         if (self._scales != 1).any():
             block *= self._scales[:, None, None]
         return block.reshape(self._count, 3, -1, self._size[1]).transpose(0, 2, 3, 1)
@@ -336,11 +274,12 @@ class LitPlanes(RowPlanes):
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
         counted, (power, totals) = mask.ravel(), np.zeros((2, self._count, 3))
         for k, begin in enumerate(with_progress(self._begins, "strips")):
-            strip = self._lit[k]
+            strip = self._lit.strip(k)
             of_strip = strip.power_and_totals(counted[begin : begin + strip.size])
             power += of_strip[0]
             totals += of_strip[1]
-        for i, plane in self._clean.items():
+        for i in self._clean:
+            plane = self._clean.pixels(i)
             power[i] = np.square(plane, dtype=np.float64) @ counted
             totals[i] = plane.sum(axis=1, dtype=np.float64)
         scales = self._scales.astype(np.float64)[:, None]
@@ -363,7 +302,7 @@ class LitPlanes(RowPlanes):
         column = np.minimum(column // side, columns - 1)
         step = self.strip_rows
         for k in with_progress(range(first // step, -(-last // step)), "strips"):
-            strip = self._lit[k]
+            strip = self._lit.strip(k)
             begin = max(k * step // side - top, 0)  # of the blocks that it touches
             end = min(-(-(k * step + step) // side) - top, bottom - top)
             of_block = np.clip((row + k * step) // side - top, begin, end - 1) - begin
@@ -372,8 +311,10 @@ class LitPlanes(RowPlanes):
             of_strip = weights.ravel()[start : start + strip.size]
             found = strip.sums_of_groups(groups, of_strip, (end - begin) * columns)
             sums[:, :, begin:end] += found.reshape(3, self._count, end - begin, columns)
-        for i, plane in self._clean.items():
-            channels = plane.reshape(3, *self._size)[:, first:last, :width] * weight[first:last]
+        for i in self._clean:
+            plane = self._clean.pixels(i, first * self._size[1], last * self._size[1])
+            rows = plane.reshape(3, last - first, self._size[1])
+            channels = rows[:, :, :width] * weight[first:last]
             sums[:, i] = [block_sums(channel, side) for channel in channels]
         scaled: Doubles = sums.transpose(1, 2, 3, 0) * self._scales[:, None, None, None]
         return scaled
@@ -384,28 +325,56 @@ class LitPlanes(RowPlanes):
 
     def _mix(self, weights: Doubles) -> Doubles:
         scaled = weights * self._scales[:, None]
-        strips = parallel_map(lambda strip: strip.mix(scaled), self._lit, unit="strips")
+        numbers = range(len(self._begins))
+        strips = parallel_map(lambda k: self._lit.strip(k).mix(scaled), numbers, unit="strips")
         mixed = np.concatenate(strips, axis=1)
-        for i, plane in self._clean.items():
-            mixed += scaled[i][:, None] * plane
+        for i in self._clean:
+            mixed += scaled[i][:, None] * self._clean.pixels(i)
         return np.asarray(mixed)
 
 
 class LitCollector:
-    """Planes that are collected light by light, as long as there is room for their lit pixels."""
+    """Planes that are collected light by light, as long as there is room for their lit pixels, in
+    memory or in temporary files.
+    """
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size, self._bytes = size, 0
         self._planes: dict[str, tuple[LitPlane, ...]] | None = {}
+        self._in_memory: list[str] = []
+        self._files: list[TemporaryArray] = []
 
     def add(self, name: str, planes: Sequence[LitPlane]) -> None:
-        """Add the planes of a light; drop all if they take too much memory."""
+        """Add the planes of a light; drop all if they take too much room."""
         if self._planes is None:
             return
         self._planes[name] = tuple(planes)
+        self._in_memory.append(name)
         self._bytes += sum(plane.nbytes for plane in planes)
         if self._bytes > MAX_BYTES:
-            self._planes = None
+            self._planes, self._files = None, []
+        elif sum(x.nbytes for key in self._in_memory for x in self._planes[key]) > SPOOLED_BYTES:
+            with suppress(OSError):  # no room on the disk
+                self._spool(self._planes)
+            self._in_memory = []
+
+    def _spool(self, planes: dict[str, tuple[LitPlane, ...]]) -> None:
+        """Move the planes in memory to a temporary file, of which they are parts then."""
+        moved = [plane for key in self._in_memory for plane in planes[key]]
+        file, end = TemporaryArray((sum(x.nbytes // 4 + 2 for x in moved),)), 0
+
+        def of_file(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            nonlocal end
+            first, end = end, write_array(file, end, array)
+            return mapped_array(file, first, array.dtype, array.size).reshape(array.shape)
+
+        for key in self._in_memory:
+            planes[key] = tuple(
+                replace(x, pixels=of_file(x.pixels), numbers=of_file(x.numbers))
+                for x in planes[key]
+            )
+        file.release()
+        self._files.append(file)
 
     def planes(self, names: Sequence[str]) -> list[LitPlanes] | None:
         """Return each set of planes, in the order of `names`, and forget them; None if there was no
@@ -413,9 +382,14 @@ class LitCollector:
         """
         if self._planes is None:
             return None
+
+        def release() -> None:
+            for file in self._files:
+                file.release()
+
         sets = list(zip(*(self._planes.pop(name) for name in names), strict=True))
         joined = []
         while sets:  # one is gone before the next is joined
-            joined.append(LitPlanes(sets.pop(0), self._size))
+            joined.append(LitPlanes(sets.pop(0), self._size, release))
             release_freed_memory()
         return joined

@@ -8,7 +8,7 @@ is the average of a block: many more samples of nearly the same light. The noise
 look, as the display shows it, determines the size of blocks.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import (
-    BLOCK_PIXELS,
     Basis,
     Planes,
     array_name,
@@ -26,6 +25,7 @@ from lightpaint.basis import (
     in_one_row,
     mix_channels,
     spooled,
+    walked_blocks,
 )
 from lightpaint.colour import ViewTransform
 from lightpaint.images import Estimate, block_sums, enlarged
@@ -100,10 +100,11 @@ class LitPixels:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
         def strip_terms(strip: slice, pixels: pixel_loss.PixelLoss) -> tuple[float, Doubles]:
-            rows = self.planes.pixels(strip).transpose(2, 0, 1).astype(np.float64, order="C")
-            x = np.stack([w @ lit for w, lit in zip(weights.T, rows, strict=True)])
-            value, slope = pixels.objective_and_gradient(x)
-            return value, np.stack([lit @ s for lit, s in zip(rows, slope, strict=True)], axis=1)
+            light = _StripLight(self.planes, strip)
+            w = weights.T
+            parts = [np.stack([w[c] @ lit for c, lit in enumerate(x)]) for x in light]
+            value, slope = pixels.objective_and_gradient(np.concatenate(parts, axis=1))
+            return value, light.products(slope)
 
         values, slopes = zip(*self.pixels.map_strips(strip_terms), strict=True)
         return sum(values), np.asarray(sum(slopes))
@@ -112,10 +113,7 @@ class LitPixels:
         """Return the inner products of each light with a picture (3, p), (n, 3)."""
 
         def strip_products(strip: slice, _: pixel_loss.PixelLoss) -> Doubles:
-            rows = self.planes.pixels(strip)
-            return np.stack(
-                [rows[..., c].astype(np.float64) @ picture[c, strip] for c in range(3)], axis=1
-            )
+            return _StripLight(self.planes, strip).products(picture[:, strip])
 
         return np.asarray(sum(self.pixels.map_strips(strip_products)))
 
@@ -163,6 +161,37 @@ class LitPixels:
 
         counted = np.flatnonzero(self.pixels.importance)
         return NormalEquations(*self.planes.sums_of(counted, squares))
+
+
+class _StripLight:
+    """The light of a strip of pixels, block by block, of which one is in memory at a time.
+
+    Its only block, of few lights, stays in memory.
+    """
+
+    def __init__(self, planes: Planes, strip: slice) -> None:
+        self._planes, self._blocks = planes, walked_blocks(planes, strip.stop, strip.start)
+        self._only: Doubles | None = None
+
+    def __iter__(self) -> Iterator[Doubles]:
+        """Yield the light of each block, (3, n, p) float64."""
+        if self._only is not None:
+            yield self._only
+            return
+        for block in self._blocks:
+            light = self._planes.pixels(block).transpose(2, 0, 1).astype(np.float64, order="C")
+            if len(self._blocks) == 1:
+                self._only = light
+            yield light
+
+    def products(self, picture: Doubles) -> Doubles:
+        """Return the inner products of each light with a picture of the strip, (3, p), (n, 3)."""
+        products, begin = np.zeros((self._planes.count, 3)), 0
+        for light in self:
+            part = picture[:, begin : begin + light.shape[2]]
+            products += np.stack([x @ y for x, y in zip(light, part, strict=True)], axis=1)
+            begin += light.shape[2]
+        return products
 
 
 @dataclass(frozen=True)
@@ -263,8 +292,7 @@ class BinnedPixels:
         current_picture = LitPixels.whole(self.basis, self.loss).predicted(current)
         _, weight = self.loss.pixels.squares(current_picture, from_clipping=False)
         power = np.zeros(current.shape)
-        for start in with_progress(range(0, weight.shape[1], BLOCK_PIXELS)):
-            where = slice(start, start + BLOCK_PIXELS)
+        for where in with_progress(walked_blocks(self.basis.noise, weight.shape[1])):
             halves = self.basis.noise.pixels(where).astype(np.float64)
             power += np.einsum("cp,npc->nc", weight[:, where], np.square(halves))
         return pull_to_current(PRIOR_STRENGTH * power, current)

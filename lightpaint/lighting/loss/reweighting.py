@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis import Basis, MemoryPlanes
+from lightpaint.basis import Basis, MemoryPlanes, walked_blocks
 from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
 from lightpaint.lighting.loss.pixel_loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -443,9 +443,12 @@ def _information(lit: LitPixels, power: Doubles) -> Doubles:
     """Return the information on lights in each pixel, (p,): Σ D Φ² / power over the lights."""
     part = np.where(power > 0, 1 / np.where(power > 0, power, 1), 0).astype(np.float32)
 
+    def block_information(block: slice) -> Doubles:
+        squares = np.square(lit.planes.pixels(block))
+        return np.asarray(sum(part[:, c] @ squares[..., c] for c in range(3)))
+
     def strip_information(strip: slice, pixels: PixelLoss) -> Doubles:
-        squares = np.square(lit.planes.pixels(strip))
-        information = sum(part[:, c] @ squares[..., c] for c in range(3))
-        return np.asarray(information * pixels.importance)
+        blocks = walked_blocks(lit.planes, strip.stop, strip.start)
+        return np.concatenate([block_information(block) for block in blocks]) * pixels.importance
 
     return np.concatenate(lit.pixels.map_strips(strip_information))

@@ -47,27 +47,38 @@ class DraftPictures:
     """The drafts of one view, whose details are found once for each current look."""
 
     def __init__(self) -> None:
-        self._known: tuple[LiveView, Floats, Floats] | None = None
+        self._known: tuple[LiveView, Floats, dict[int, Floats]] | None = None
 
     def picture(self, view: Canvas, weights: Doubles, step: int = 1) -> Picture:
         """Return the draft of a lighting as a page has it, (h, w, 3) float16.
 
         weights: (n, 3). step: return every step-th pixel of every step-th row.
         """
-        detail = self._detail(view)[::step, ::step]
-        small = view.live.draft(weights)
-        return as_halves(resampled(small, detail.shape[:2]) * detail)
+        detail, small = self._detail(view, step), view.live.draft(weights)
+        halves = np.empty((*detail.shape[1:], 3), np.float16)
+        # Channel by channel: the memory of whole pictures would be new each time.
+        for c, of_channel in enumerate(detail):
+            light = resampled(small[..., c : c + 1], of_channel.shape)[..., 0]
+            light *= of_channel
+            halves[..., c] = as_halves(light)
+        return halves
 
-    def _detail(self, view: Canvas) -> Floats:
-        """Return the current look over its own average, (h, w, 3), as large as a page has it."""
+    def _detail(self, view: Canvas, step: int) -> Floats:
+        """Return the current look over its own average, (3, h, w), as large as a page has it, at
+        every step-th pixel of every step-th row.
+        """
         live, look = view.live, view.current
         if self._known is None or self._known[0] is not live or self._known[1] is not look:
             average = live.averaged(look)
             floor = np.float32(FLOOR * look.mean() + np.finfo(np.float32).tiny)
             whole = (look + floor) / (resampled(average, look.shape[:2]) + floor)
             detail = block_mean(np.minimum(whole, MAX_DETAIL), page_factor(view.basis))
-            self._known = live, look, np.asarray(detail, np.float32)
-        return self._known[2]
+            whole = np.ascontiguousarray(detail.transpose(2, 0, 1), np.float32)
+            self._known = live, look, {1: whole}
+        details = self._known[2]
+        if step not in details:
+            details[step] = np.ascontiguousarray(details[1][:, ::step, ::step])
+        return details[step]
 
 
 def checked_weights(basis: Basis, arrays: Mapping[str, npt.NDArray[Any]]) -> Doubles:

@@ -24,7 +24,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis import BLOCK_PIXELS, Basis, Planes, as_planes
+from lightpaint.basis import Basis, Planes, as_planes, walked_blocks
 from lightpaint.errors import BasisError, LightpaintError, SizeError
 from lightpaint.images import Estimate, SurfaceFilter, box_mean
 from lightpaint.keywords import keywords
@@ -159,8 +159,8 @@ def _push_covariance(solution: Solution, noise: Floats, directions: Doubles) -> 
     weight = solution.weight.reshape(len(noise), -1)
     covariance = np.zeros((directions.shape[1], directions.shape[1]))
     counted = np.flatnonzero(solution.importance)
-    for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
-        pixels = counted[start : start + BLOCK_PIXELS]
+    for block in with_progress(walked_blocks(basis.planes, counted.size)):
+        pixels = counted[block]
         lit, push = basis.planes.pixels(pixels), np.zeros((directions.shape[1], pixels.size))
         for c in np.flatnonzero(along.any(axis=(1, 2))):
             pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]

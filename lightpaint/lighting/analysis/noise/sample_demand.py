@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.basis import BLOCK_PIXELS
+from lightpaint.basis import walked_blocks
 from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels
 from lightpaint.lighting.analysis.noise.weight_directions import gradient_response
 from lightpaint.lighting.solution import Solution
@@ -52,7 +52,7 @@ def pixel_variances(solution: Solution, aims: Doubles) -> Doubles:
         variances[part] = np.square(push @ rows).sum(axis=0)
 
     counted = pixels.counted
-    blocks = [counted[k : k + BLOCK_PIXELS] for k in range(0, counted.size, BLOCK_PIXELS)]
+    blocks = [counted[block] for block in walked_blocks(solution.basis.planes, counted.size)]
     parallel_map(fill, blocks, unit="blocks")
     return variances.reshape(solution.importance.shape)
 
