@@ -106,7 +106,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     colours are painted where it shines.
     """
     monkeypatch.setattr(PaintReading, "gamuts", lambda *_: None)
-    for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
+    for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST", "RESTRAINT"):
         monkeypatch.setattr(weight_penalty, name, 0.0)
     basis = _basis(make_basis)
     target = _paint(basis, over_look=True)

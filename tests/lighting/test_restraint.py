@@ -1,5 +1,6 @@
 """Each light pays for what it does where nothing is painted, so that none goes off unasked."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,12 +83,33 @@ def test_the_price_is_that_of_each_light_by_itself(make_basis: Any, transform: A
     np.testing.assert_allclose(made.restraint.objective(weights), expected, rtol=1e-5)
 
 
-def test_nothing_is_paid_where_all_is_painted_or_nothing_held(make_basis: Any) -> None:
+def test_nothing_is_paid_where_all_is_painted_or_only_paint_counts(make_basis: Any) -> None:
     basis = _room(make_basis)
     everywhere = Problem.of(basis, _brighter(basis, np.ones(SIZE)))
     assert everywhere.restraint is None or not everywhere.restraint.M.any()
-    for fit in (Fit(hold=0.0), Fit(hold=2.0, literal=True)):
+    for fit in (Fit(hold=0.0, colors="free"), Fit(hold=2.0, literal=True)):
         assert Problem.of(basis, _brighter(basis, _left()), fit=fit).restraint is None
+
+
+def test_no_light_goes_off_for_nearly_nothing_where_nothing_is_held(make_basis: Any) -> None:
+    """A fill spills 5 % on half of the paint, which asks for what the key alone makes there."""
+    images, spilt = _room(make_basis).images.copy(), _left()
+    spilt[:, SIZE[1] // 4 :] = 0
+    images[1] += 0.05 * spilt[..., None]
+    basis = make_basis(images=images, names=["key", "fill"], emission=np.ones((2, 3)))
+    target = _brighter(basis, _left())
+    key_alone = np.where(spilt[..., None] > 0, 3 * images[0], target.image)
+    target = replace(target, image=key_alone.astype(np.float32))
+    key, fill = _levels(basis, target, hold=0.0)
+    assert key > 2.9
+    assert fill > 0.8
+
+
+def test_a_hold_of_nothing_counts_no_unpainted_pixel(make_basis: Any) -> None:
+    """A lamp that the paint asks for shines on the rest as it would alone."""
+    basis = _room(make_basis, spill=1.0)
+    assert _levels(basis, _brighter(basis, _left()), hold=0.0)[0] > 2.8
+    assert _levels(basis, _brighter(basis, _left()), hold=4.0)[0] < 2.5
 
 
 def test_a_light_that_is_down_for_unpainted_parts_is_named_with_what_helps(

@@ -45,7 +45,7 @@ a wish comes from texels, its contrast stays the contrast of a brush.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import ceil
 from operator import add
@@ -60,6 +60,7 @@ from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import expected_lights
 from lightpaint.lighting.loss.footprints import find_footprint, footprint_term
+from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.painting_loss import display_amplitude
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
@@ -96,6 +97,10 @@ COLOR_PULL, CLEAR_PULL = 1.5, 0.01
 #: Price of what each light by itself does to unpainted pixels, relative to the price of what all
 #: lights together do: the hold.
 RESTRAINT = 0.25
+
+#: Least hold by which that price is paid, but where colours are free: with a hold of 0, too, lights
+#: that the paint does not ask for stay as they are.
+LEAST_HOLD = 0.1
 
 #: Approximate number of blocks of pixels over which that price is summed.
 RESTRAINT_BLOCKS = 2**11
@@ -321,7 +326,7 @@ class PaintTerms:
                 else footprint_term(wash, footprint, fit.transform, importance),
                 flame_term(wash.flames, fit.transform, importance),
             ),
-            restrain_lights(wash, own, fit.transform, unpainted=unpainted),
+            restrain_lights(wash, own, fit, unpainted=unpainted),
         )
 
 
@@ -436,31 +441,37 @@ def pull_near_start(
 def restrain_lights(
     wash: expected_lights.Wash,
     reference: Doubles,
-    transform: ViewTransform | None,
+    fit: Fit,
     *,
     unpainted: float,
 ) -> NormalEquations | None:
-    """Return the price of what each light by itself does to unpainted pixels; None without a hold.
+    """Return the price of what each light by itself does to unpainted pixels; None without any.
 
     A hold counts what all lights together do there: one light may be turned off to make up for what
-    another spills, although nobody painted that. So each light also pays for its own change,
+    another spills, although nobody painted that; without a hold, lights may go off for nearly
+    nothing. So each light also pays for its own change,
 
         s ū Σᵢ Eᵢ/3 Σ_c (wᵢ/pᵢ − 1)²,     Eᵢ = Σ (1 − D) |A Φᵢ pᵢ / L|²
 
     with A, the change of a value of the loss with a relative change of the look L. Equal shares of
     all channels cost the same, so that the price is none on a light's colour.
 
-    reference: (n, 3), the weights p that the look has. transform: the view transform of the loss;
-    None for linear light. unpainted: ū, the weight of each unpainted pixel.
+    reference: (n, 3), the weights p that the look has. unpainted: ū, the weight of each unpainted
+    pixel; with a weaker hold than LEAST_HOLD, ū is that of LEAST_HOLD.
     """
+    painted = wash.counts * np.minimum(wash.importance, 1)
+    counts = wash.counts - painted
+    total = float(counts.sum())
+    if fit.colors != "free" and not fit.unpainted and (fit.hold or 0) < LEAST_HOLD:
+        least = unpainted_weight(float(painted.sum()), total, replace(fit, hold=LEAST_HOLD))
+        unpainted = max(unpainted, least)
     if unpainted <= 0:
         return None
     sampled = slice(None, None, ceil(wash.counts.size / RESTRAINT_BLOCKS))
     dark = expected_lights.DARK * float(np.maximum(wash.look, 0).mean()) or 1.0
     look = np.maximum(wash.look[:, sampled], 0).astype(np.float64)
-    slope = display_amplitude(look, transform) / (look + dark)
-    counts = wash.counts * (1 - np.minimum(wash.importance, 1))
-    total, rest = float(counts.sum()), counts[sampled]
+    slope = display_amplitude(look, fit.transform) / (look + dark)
+    rest = counts[sampled]
     rest = rest * (total / max(float(rest.sum()), 1e-300))
     rows = np.square(wash.rows[:, :, sampled])
     per_block = (slope**2 * rest).astype(np.float32)
