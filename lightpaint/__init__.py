@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
+    from lightpaint.lighting.analysis.noise.uncertainty import with_error_bars as with_error_bars
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
     from lightpaint.lighting.answer.combination import combine as combine
     from lightpaint.lighting.answer.lighting import Lighting as Lighting

@@ -72,6 +72,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "diagnose",
             "Diagnosis",
             "error_bars",
+            "with_error_bars",
             "Uncertainty",
             "verdict",
         ),

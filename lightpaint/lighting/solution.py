@@ -120,8 +120,8 @@ class Solution(Shown):
     def to_dataframe(self) -> Any:
         """Return the table of `Lighting.to_dataframe`, with the former emission of each light.
 
-        The solution of an `Analysis` has errors; the solution of `solve` has none, and NaN in their
-        place.
+        The solutions of an `Analysis` and of `with_error_bars` have errors; the solution of `solve`
+        has none, and NaN in their place.
 
         was_red, was_green, was_blue: its emission in the scene. stops: the change of its
         luminance, -inf for a light that is off now. Raises LightpaintError without pandas.

@@ -452,7 +452,16 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
 
 
 def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
-    """Return `solution` with the standard errors of lights and objective, if known."""
+    """Return `solution` with the standard errors of lights and objective, if known.
+
+    uncertainty: its `error_bars`; None if the noise of the basis is unknown.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> table = lp.with_error_bars(solution, lp.error_bars(solution)).to_dataframe()
+        >>> bool(table.error_red.notna().all())
+        True
+    """
     if uncertainty is None:
         return solution
     ends = np.stack(uncertainty.interval, axis=-1)
