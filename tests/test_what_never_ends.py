@@ -13,14 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import run_refused
+from command import run_refused, succeed
 from patience import PATIENCE_S
 from renderer import write_room
 
 from lightpaint import files
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.errors import SceneError
+from lightpaint.errors import PaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.store.stored_arrays import read_kept_looks
 
 #: Seconds that a refusal may take; Mitsuba starts in them.
 AT_ONCE = 60
@@ -148,6 +150,33 @@ def test_beside_the_scene_and_in_a_template(folder: Path) -> None:
     (folder / "template" / "template.json").symlink_to("/proc/kmsg")
     message = run_refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
     assert "template.json" in message
+    for kind in ("pipe", "folder"):
+        (folder / "template" / "template.json").unlink()
+        made(folder / "template" / "template.json", kind)
+        message = run_refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
+        assert "template.json is a " in message
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("pipe", "is a device or a pipe, not a lights file"),
+        ("folder", "is a folder, not a lights file"),
+        ("nowhere", "no such lights file: "),
+    ],
+)
+def test_what_has_the_name_of_a_lights_file_is_none_that_is_absent(
+    folder: Path, kind: str, message: str
+) -> None:
+    """A link that leads nowhere, as after a move, would silently free all lights."""
+    place = folder / "room.lights.toml"
+    if kind == "nowhere":
+        place.symlink_to("moved.lights.toml")
+    else:
+        made(place, kind)
+    refusal = run_refused(folder, "lights", "--no-sheet", "room.xml")
+    assert message in refusal
+    assert "room.lights.toml" in refusal
 
 
 class HalfWay:
@@ -232,3 +261,20 @@ def test_files_that_are_read_as_they_were(tmp_path: Path) -> None:
     assert files.read_bytes(path, "file", SceneError, may_be_empty=True) == b""
     with pytest.raises(SceneError, match="a is empty, or only made up"):
         files.file_length(path, "file", SceneError)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "sparse", "folder", "/dev/zero"])
+def test_a_session_that_is_none(tmp_path: Path, kind: str) -> None:
+    """A copy of one, to recover it, would fill the disk."""
+    made(tmp_path / "session.db", kind)
+    with pytest.raises(PaintError, match=r"session\.db is .*, (?:not a|and nearly all|so it)"):
+        Store.open(tmp_path / "session.db", None)
+    with pytest.raises(PaintError, match=r"session\.db"):
+        read_kept_looks(tmp_path / "session.db")
+
+
+def test_a_tag_of_the_cache_that_is_none(folder: Path) -> None:
+    """Its folder is foreign then, as one without a tag is."""
+    (folder / "kept").mkdir()
+    made(folder / "kept" / "CACHEDIR.TAG", "pipe")
+    succeed(folder, "cache", "list", LIGHTPAINT_CACHE=str(folder / "kept"))

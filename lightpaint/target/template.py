@@ -284,7 +284,8 @@ def find_template(painting: Path) -> Path | None:
         x.parent for x in folder.glob(f"*/{RECORD_FILE}") if x.with_name(SHOWN_FILE).is_file()
     ]
     places = (folder, folder / "template", *(beside if len(beside) == 1 else ()), Path("template"))
-    return next((place for place in places if (place / RECORD_FILE).is_file()), None)
+    # What has its name is no absent one, be it a pipe, or a link that leads nowhere.
+    return next((place for place in places if os.path.lexists(place / RECORD_FILE)), None)
 
 
 def file_names(names: Iterable[str]) -> list[str]:

@@ -29,7 +29,7 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, LightpaintError, OutputError
-from lightpaint.files import replacing, write_text
+from lightpaint.files import read_text, replacing, write_text
 
 #: Size of the cache in bytes above which the least recently used bases are deleted.
 MAX_BYTES = 8 * 2**30
@@ -58,7 +58,7 @@ COMPANION_NAME = re.compile(
 LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
 
 #: Marks a cache folder, by a convention that backup programs know: https://bford.info/cachedir
-TAG = "CACHEDIR.TAG"
+TAG, MAX_TAG = "CACHEDIR.TAG", 2**16
 TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
 # This file is a cache directory tag created by lightpaint, which keeps rendered bases here.
 # All of this folder may be deleted at any time.
@@ -417,8 +417,8 @@ def _foreign_names(path: Path) -> list[str]:
     """Return some foreign names in the folder; none if it is ours or new, or contains only hidden
     files.
     """
-    with suppress(OSError):
-        if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
+    with suppress(LightpaintError):
+        if "created by lightpaint" in read_text(path / TAG, "tag", LightpaintError, limit=MAX_TAG):
             return []
     names: list[str] = []
     with suppress(OSError):

@@ -19,7 +19,7 @@ from pathlib import Path
 from lightpaint.basis import joined_texels
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
-from lightpaint.files import first_line, flush
+from lightpaint.files import file_length, first_line, flush
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.sentences import Hint, Remedy, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
@@ -60,6 +60,9 @@ DAMAGE_ERRORS = (sqlite3.Error, ArithmeticError, AttributeError, LookupError, Ty
 
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
+#: Longest session in bytes.
+MAX_SESSION = 2**44
+
 WriteJob = Callable[[sqlite3.Connection], object]
 
 
@@ -73,6 +76,8 @@ def open_database(path: Path | None, identity: Identity | None) -> sqlite3.Conne
     with _translated_errors(path):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
+            if path.exists():  # a pipe may never answer, and a copy of a sparse file fills the disk
+                file_length(path, "session", PaintError, limit=MAX_SESSION, may_be_empty=True)
         database = sqlite3.connect(
             path or ":memory:", timeout=0, isolation_level=None, check_same_thread=False
         )

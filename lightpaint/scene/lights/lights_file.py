@@ -5,6 +5,7 @@ moves are stored unparsed; lighting/constraints/constraints_file.py and placemen
 them.
 """
 
+import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -216,11 +217,14 @@ def lights_file_beside(scene: Path) -> Path:
 def lights_file_for(
     scene: Path, path_given: str | Path | None, *, beside_scene: bool
 ) -> LightsFile:
-    """Return the content of `path_given`, or else of the file beside `scene` if permitted."""
+    """Return the content of `path_given`, or else of the file beside `scene` if permitted.
+
+    Whatever has the name of that file is read: a link that leads nowhere is no absent file.
+    """
     if path_given is not None:
         return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
-    return read_lights_file(path) if beside_scene and path.is_file() else LightsFile()
+    return read_lights_file(path) if beside_scene and os.path.lexists(path) else LightsFile()
 
 
 def read_lights_file(path: Path) -> LightsFile:
