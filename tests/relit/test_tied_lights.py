@@ -15,6 +15,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.default_solve import solve
+from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.relit.relit_scene import check_relightable, relight
 from lightpaint.relit.verification_render import verify
@@ -145,7 +146,10 @@ def test_a_file_included_twice_can_be_tied_but_not_kept_by_half(tmp_path: Path) 
     path = write_room(tmp_path, lights='<include filename="lamp.xml"/>' * 2 + LIGHTS["sky"])
     with pytest.raises(SceneError, match="tie the two into a group"):
         check_relightable(load_scene(path, lights=["point_0"]), tmp_path / "out" / "relit.xml")
+    both = "lamp.xml is included more than once: the lights point_0, point_1 are one element of it"
+    assert [x for x in remarks_of_scene(load_scene(path)) if x.startswith(both)]
     tied = load_scene(path, groups={"lamps": ["point_*"]})
+    assert not [x for x in remarks_of_scene(tied) if "more than once" in x]
     relit = relight(tied, some_lighting(tied), tmp_path / "out" / "relit.xml")
     assert len({e.emission for e in relit.emitters if e.plugin == "point"}) == 1
 

@@ -242,6 +242,7 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
         )
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"not adjusted: {some_names(obstacles, '; ')}")
+    remarks += _remarks_on_shared_elements(scene)
     if scene.is_spectral and (metals := scene.rgb_metals):
         remarks.append(
             f"{some_names(metals)}: eta and k in RGB, which Mitsuba's spectral variants show too "
@@ -254,6 +255,23 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     if not note and is_rendered:
         note = render.remark_on_separate_renders(scene) or ""
     return [*remarks, note] if note else remarks
+
+
+def _remarks_on_shared_elements(scene: Scene) -> list[str]:
+    """Return a remark for each file that is included more than once, on its lights."""
+    names: dict[Path, dict[int, set[str]]] = {}
+    for light in scene.lights:
+        for member in light.members:
+            if member.texel is None:
+                in_file = names.setdefault(scene.files[member.file].resolve(), {})
+                in_file.setdefault(member.offset, set()).add(light.name)
+    return [
+        f"{file.name} is included more than once: the lights "
+        f"{'; '.join(some_names(sorted(x)) for x in shared)} are one element of it, and can only "
+        "get the same emission: include two copies of it, or tie them into a group"
+        for file, in_file in names.items()
+        if (shared := [x for x in in_file.values() if len(x) > 1])
+    ]
 
 
 def remarks_on_spectra(scene: Scene, constraints: Constraints) -> list[Sentence]:
