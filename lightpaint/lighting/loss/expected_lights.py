@@ -242,7 +242,11 @@ class PaintedBlocks:
     @property
     def wash(self) -> Wash:
         """The wash of the view, with its wishes."""
-        wishes = wish_shares(self.layers, self.painted, self.importance, self.read_look)
+        return self.wash_in(self.read_look)
+
+    def wash_in(self, look: Floats) -> Wash:
+        """Return the wash of the view, with the wishes that it shows against a look, (h, w, 3)."""
+        wishes = wish_shares(self.layers, self.painted, self.importance, look)
         return Wash(
             self.rows,
             self.painted.reshape(-1, 3).T,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.stats import norm, t
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.noise import uncertainty
@@ -74,7 +75,7 @@ def test_intervals_of_a_sketch_hold_whatever_wishes_noise_shows(
     # Wishes move all lights together, so that seeds count alone: two standard errors below 95 %.
     least = 0.95 - 2 * (0.95 * 0.05 / SEEDS) ** 0.5
     assert share_held() > least
-    unread = ReadingNoise(np.zeros_like(best), 1.0)
+    unread = ReadingNoise(*np.zeros((3, *best.shape)), 4)
     monkeypatch.setattr(uncertainty.ReadingNoise, "of", lambda _solution: unread)
     assert share_held() < least - 0.3
 
@@ -82,12 +83,14 @@ def test_intervals_of_a_sketch_hold_whatever_wishes_noise_shows(
 def test_a_literal_painting_and_one_without_noise_are_read_in_one_way(make_basis: Any) -> None:
     target, basis = _sketch(), _noisy_basis(make_basis, 0)
     literal = ReadingNoise.of(_corrected(basis, target, literal=True, space="display"))
-    assert not literal.scatter.any()
-    assert literal.widening == 1
+    assert not np.any([literal.scatter, literal.below, literal.above])
+    known = np.full((4, 3), 2.0)
+    np.testing.assert_array_equal(literal.widened(known), known)
     assert ReadingNoise.of(_corrected(basis, target)).scatter.max() > 1e-3
     clean = make_basis(images=_pools(), emission=np.ones((4, 3)))
     # What is left is the round-off of the solves.
-    assert ReadingNoise.of(lp.solve(clean, target)).scatter.max() < 1e-9
+    reading = ReadingNoise.of(lp.solve(clean, target))
+    assert np.max([reading.scatter, reading.below, reading.above]) < 1e-9
 
 
 def test_disturbed_blocks_have_the_noise_of_the_basis_twice(make_basis: Any) -> None:
@@ -107,23 +110,36 @@ def test_disturbed_blocks_have_the_noise_of_the_basis_twice(make_basis: Any) -> 
     assert np.abs((rows > wash.rows).mean() - 0.5) < 4 * 0.5 / np.sqrt(64 * wash.counts.size)
 
 
-def test_half_of_the_difference_of_twins_is_scatter_unless_a_wish_is_found(
-    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("steady", [-6.0, 3.0, 8.0])
+def test_what_readings_change_alike_is_no_scatter(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, steady: float
 ) -> None:
-    """In closed form: what both twins do alike is no scatter; a step that one of them takes is."""
+    """In closed form: the variance of opposite parts, 1 and 2, about 0, and of equal parts, 4 and
+    1, about their mean. Half the square of a steadier look's change counts beyond that."""
     answer = _corrected(_noisy_basis(make_basis, 0), _sketch())
-    changes = {"a": 5.0, "b": 3.0, "c": 2.0, "d": 0.0}
-
-    def reading(name: str, wishes: int) -> Any:
-        return SimpleNamespace(wishes=range(wishes), change=changes[name])
-
-    pairs = [[reading("a", 2), reading("b", 2)], [reading("c", 3), reading("d", 2)]]
-    monkeypatch.setattr(uncertainty, "_disturbed_washes", lambda *_: (2, iter(pairs)))
+    pairs = [[SimpleNamespace(change=x) for x in pair] for pair in ((5.0, 3.0), (3.0, -1.0))]
+    monkeypatch.setattr(uncertainty, "_disturbed_washes", lambda *_: iter(pairs))
+    monkeypatch.setattr(uncertainty, "_steady_wash", lambda _: SimpleNamespace(change=steady))
     as_read = uncertainty.solve_for(answer, answer.problem.solved)
     monkeypatch.setattr(uncertainty, "_answer_to_reading", lambda _, wash: as_read + wash.change)
-    # (5 - 3) / 2, and the mean square of 2 and 0.
-    expected = np.sqrt((1.0**2 + (2.0**2 + 0) / 2) / 2)
-    np.testing.assert_allclose(ReadingNoise.of(answer).scatter, expected, rtol=1e-12)
+    monkeypatch.setattr(uncertainty, "PAIRS", 2)
+    reading, squares = ReadingNoise.of(answer), (1 + 4) / 2 + 2 * 1.5**2
+    np.testing.assert_allclose(reading.scatter, squares**0.5, rtol=1e-9)
+    expected = [
+        np.sqrt(max(steady**2 / 2 - squares, 0)) * side for side in (steady < 0, steady > 0)
+    ]
+    np.testing.assert_allclose(reading.below, expected[0], rtol=1e-9)
+    np.testing.assert_allclose(reading.above, expected[1], rtol=1e-9)
+
+
+def test_an_interval_is_as_wide_as_those_parts_are_uncertain_that_few_readings_tell() -> None:
+    """By Student's t: alone with as many degrees of freedom as pairs, with as much that is known
+    with four times as many, and beside much more with a normal distribution's."""
+    reading = ReadingNoise(np.ones((1, 3)), *np.zeros((2, 1, 3)), 4)
+    known = np.array([[0, 1, 1e6]])
+    expected = np.hypot(known, 1) * t.ppf(0.975, [[4, 16, 1e9]]) / norm.ppf(0.975)
+    # The approximation of t is good to .3 %.
+    np.testing.assert_allclose(reading.widened(known), expected, rtol=3e-3)
 
 
 TEXTURED_ROOM = """<scene version="3.0.0">

@@ -17,10 +17,13 @@ takes to be a wish, two become one, or one more is found. The noise of M does no
 
 So the painting is read again and again with noise added, the half difference of each block of
 pixels with either sign (a wild bootstrap, Wu 1986), and the last linear problem is solved with what
-each reading asks for. Each reading has a twin with all signs reversed, and half of their difference
-counts: what twice the noise does in the mean is no scatter. A wish that either twin finds or loses
-is a step, which often only one of them takes: there the changes of both count (docs/method.md, "How
-sure").
+each reading asks for. Each reading has a twin with all signs reversed, so that both show what noise
+does in the mean of all readings. That is no scatter; what is left of their changes is.
+
+More noise also makes more and larger wishes: a place where the ratio is near the least that is one
+becomes one. How much of that the noise of the basis itself did, readings with more noise do not
+show, once all such places have become wishes. So the painting is also read with the wishes that it
+has against a steadier look, and intervals reach farther on that side (docs/method.md, "How sure").
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,11 +46,12 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
 )
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.painting_noise import CORRELATION, PaintingNoise
+from lightpaint.lighting.analysis.noise.residuals import steadier_light
 from lightpaint.lighting.analysis.noise.weight_directions import NORMAL, WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, ViewsReading, are_sketches
+from lightpaint.lighting.problem import ViewsReading, are_sketches
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
 
@@ -56,6 +60,9 @@ PAIRS, FEW_PAIRS = 4, 2
 
 #: Fewest lights that count as many.
 MANY_LIGHTS = 64
+
+#: Ratio of all scatter to a part of it beyond which that part's degrees of freedom do not matter.
+MAX_RATIO = 100.0
 
 #: Seed of the signs of the noise that is added.
 SEED = 1
@@ -85,43 +92,70 @@ OWN = 1 - 1e-6
 class ReadingNoise:
     """The noise in the reading of a painting.
 
-    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to the
-    interval of a standard deviation which is known.
+    scatter: (n, 3), standard deviation of the weights by it. below, above: (n, 3), by how much they
+    may be lower and higher beyond it, since a steadier look shows other wishes. pairs: the number
+    of pairs of readings that determine the scatter.
     """
 
     scatter: Doubles
-    widening: float
+    below: Doubles
+    above: Doubles
+    pairs: int
 
     @classmethod
     def of(cls, solution: Solution) -> Self:
         """Read the painting of an answer several times; a literal one has no such noise."""
-        problem = solution.problem
-        if not problem.fit.reads_wishes(is_sketch=are_sketches(problem.views)):
-            return cls(np.zeros_like(solution.weights), 1.0)
+        problem, nothing = solution.problem, np.zeros_like(solution.weights)
         count = PAIRS if len(solution.weights) < MANY_LIGHTS else FEW_PAIRS
-        as_read, squares = solve_for(solution, problem.solved), []
-        known, pairs = _disturbed_washes(problem, count)
-        for pair in pairs:
-            changes = [_answer_to_reading(solution, wash) - as_read for wash in pair]
-            is_smooth = all(len(wash.wishes) == known for wash in pair)
-            parts = [(changes[0] - changes[1]) / 2] if is_smooth else changes
-            squares.append(np.square(parts).mean(axis=0))
-        return cls(np.sqrt(np.mean(squares, axis=0)), float(t_ratios(np.array(count))))
+        if not problem.fit.reads_wishes(is_sketch=are_sketches(problem.views)):
+            return cls(nothing, nothing, nothing, count)
+        views = problem.views
+        blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
+        as_read = solve_for(solution, problem.solved)
+        pairs = np.array(
+            [
+                [_answer_to_reading(solution, wash) - as_read for wash in pair]
+                for pair in _disturbed_washes(blocks, count)
+            ]
+        )
+        # Of twins, one part has opposite signs, and the other part is the same.
+        opposite, same = (pairs[:, 0] - pairs[:, 1]) / 2, (pairs[:, 0] + pairs[:, 1]) / 2
+        squares = np.square(opposite).mean(axis=0) + same.var(axis=0, ddof=1)
+        shift = _answer_to_reading(solution, _steady_wash(blocks)) - as_read
+        # Half of the square is the steadier look's own.
+        more = np.sqrt(np.maximum(np.square(shift) / 2 - squares, 0))
+        below, above = np.where(shift < 0, more, 0), np.where(shift > 0, more, 0)
+        return cls(np.sqrt(squares), below, above, count)
+
+    def widened(self, known: Doubles) -> Doubles:
+        """Return the root of the sum of squares of known standard deviations, (n, 3), and of the
+        scatter, wider where that is most of it: a few pairs determine it (Welch 1947).
+        """
+        total = _root(known, self.scatter)
+        ratio = np.divide(
+            total, self.scatter, out=np.full_like(total, np.nan), where=self.scatter > 0
+        )
+        return np.asarray(total * t_ratios(self.pairs * np.minimum(ratio, MAX_RATIO) ** 4))
 
 
-def _disturbed_washes(problem: Problem, count: int) -> tuple[int, Iterator[list[Wash]]]:
-    """Return the number of wishes that the views of a problem show, and pairs of washes of them:
-    with more noise, and with its opposite.
-    """
-    rng, views = np.random.default_rng(SEED), problem.views
-    blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
+def _disturbed_washes(blocks: Sequence[NoisyBlocks], count: int) -> Iterator[list[Wash]]:
+    """Yield pairs of washes of views: with more noise, and with its opposite."""
+    rng = np.random.default_rng(SEED)
+    for _ in with_progress(range(count), "readings"):
+        disturbed = [view.disturbed(rng) for view in blocks]
+        yield [Wash.joined(washes) for washes in zip(*disturbed, strict=True)]
 
-    def pairs() -> Iterator[list[Wash]]:
-        for _ in with_progress(range(count), "readings"):
-            disturbed = [view.disturbed(rng) for view in blocks]
-            yield [Wash.joined(washes) for washes in zip(*disturbed, strict=True)]
 
-    return sum(len(view.blocks.wash.wishes) for view in blocks), pairs()
+def _steady_wash(blocks: Sequence[NoisyBlocks]) -> Wash:
+    """Return the wash of views with the wishes that they show against a steadier look."""
+    washes = []
+    for view in blocks:
+        look, counted = view.blocks.look, (view.blocks.counts > 0)[..., None].astype(np.float64)
+        steady, _ = steadier_light(
+            *(x.astype(np.float64) for x in (look, view.look_noise)), counted
+        )
+        washes.append(view.blocks.wash_in(steady.astype(np.float32)))
+    return Wash.joined(washes)
 
 
 def _answer_to_reading(solution: Solution, wash: Wash) -> Doubles:
@@ -331,16 +365,12 @@ def error_bars(
         spread = spread.mixed_with(response.spread(noise.full_covariance), doubts)
         moved = far - weights - bias
     by_poses, reading = _scatter_by_poses(solution, level_errors), ReadingNoise.of(solution)
-    sides, wide = (
-        [_root(*parts, exit_, moved, by_poses) for exit_ in spread.exits]
-        for parts in (
-            (spread.inside, unsteady, reading.scatter),
-            (
-                *(spread.inside * noise.widening, wide_by_painting, unsteady),
-                reading.scatter * reading.widening,
-            ),
-        )
-    )
+    sides, wide = [], []
+    for exit_, beyond in zip(spread.exits, (reading.below, reading.above), strict=True):
+        common = exit_, beyond, unsteady, moved, by_poses
+        sides.append(_root(spread.inside, reading.scatter, *common))
+        known = _root(spread.inside * noise.widening, wide_by_painting, *common)
+        wide.append(reading.widened(known))
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
     return Uncertainty(
