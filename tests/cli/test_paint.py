@@ -160,9 +160,9 @@ def test_what_cannot_be_painted_is_said_in_one_line(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("room.basis.exr --layers empty.ora", "empty.ora is damaged: it lacks"),
+        ("room.basis.exr --layers empty.ora", "empty.ora is damaged: the archive has no file"),
         ("room.xml --off lamp", "no light 'lamp'; there are panel, bulb, beam, sun, sky"),
-        nightly("room.xml --layers empty.ora", "empty.ora is damaged: it lacks"),
+        nightly("room.xml --layers empty.ora", "empty.ora is damaged: the archive has no file"),
         nightly("room.xml --sensor side", "has no sensor 'side'"),
         nightly("room.xml --resolution 7x3", "cannot be reduced to 7x3"),
         nightly("room.xml --split lamp=2x2", "no light 'lamp' to split"),

@@ -380,7 +380,7 @@ def test_what_cannot_be_given_is_said_at_once(
 ) -> None:
     (tmp_path / "empty.ora").write_bytes(layered(None))
     for options, message in (
-        ({"layers": tmp_path / "empty.ora"}, r"empty\.ora is damaged: it lacks"),
+        ({"layers": tmp_path / "empty.ora"}, r"empty\.ora is damaged: the archive has no file"),
         ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
         ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
         ({"layers": 5}, "layers is 5: expected the path of a file"),

@@ -85,14 +85,21 @@ def naming_damage() -> Iterator[None]:
     """Turn the errors of a damaged archive, or of a list in it, into an ImageError in one line."""
     try:
         yield
-    except KeyError as error:
-        raise ImageError(f"is damaged: it lacks {_foreign(error)}") from None
+    except KeyError as error:  # of an element
+        raise ImageError(f"is damaged: an entry of its list lacks {_foreign(error)}") from None
     except OSError as error:
         if error.errno not in DAMAGE_ERRNOS:
             raise
         raise ImageError(f"is damaged: {_foreign(error)}") from error
     except DAMAGES as error:
         raise ImageError(f"is damaged: {_foreign(error)}") from error
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
+    """Return a file of an archive. Raises ImageError if there is none of that name."""
+    if name not in archive.NameToInfo:
+        raise ImageError(f"is damaged: the archive has no file {ascii(name)[:200]}")
+    return archive.getinfo(name)
 
 
 def _foreign(error: Exception) -> str:
@@ -105,7 +112,7 @@ def unpack_png(archive: zipfile.ZipFile, name: str, place: Path, kind: str) -> N
 
     Raises ImageError if it is something else or too long, and what `naming_damage` turns into one.
     """
-    member = archive.getinfo(name)
+    member = _member(archive, name)
     if member.file_size > MAX_MERGED:
         raise ImageError(f"declares a {kind} that is too large to unpack")
     with archive.open(member) as packed, place.open("wb") as unpacked:
@@ -221,7 +228,7 @@ def opened_openraster(
 
 
 def _parsed_stack(archive: zipfile.ZipFile) -> ElementTree.Element:
-    if archive.getinfo(STACK).file_size > MAX_STACK:
+    if _member(archive, STACK).file_size > MAX_STACK:
         raise ImageError("declares a list of layers that is too long")
     text = archive.read(STACK)
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
@@ -241,7 +248,7 @@ def _check_layers(root: ElementTree.Element, archive: zipfile.ZipFile) -> None:
         raise ImageError(f"has {uses.total()} layers: expected at most {MAX_LAYERS}; merge some")
     pixels = 0
     for source, number in uses.items():
-        with archive.open(source) as packed:
+        with archive.open(_member(archive, source)) as packed:
             head = packed.read(PNG_HEAD)
         if kind_of(head) != "png":
             raise ImageError("has a layer that is not a PNG: save it again")
