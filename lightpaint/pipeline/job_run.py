@@ -54,7 +54,7 @@ from lightpaint.relit import (
     verify_in_stages,
     with_light_tests,
 )
-from lightpaint.report import make_ahead, prepare_page
+from lightpaint.report import answer_remarks, make_ahead, prepare_page
 from lightpaint.scene import Scene, render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word
 
@@ -185,19 +185,12 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     )
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
         solution = job_bases.without_noise(job, solution)
-    solution = _without_filter(job, answer_as_multiplied(solution), listen)
-    held = hold_to_current(
-        solution, lambda x: answer_as_multiplied(job_bases.without_noise(job, x))
-    )
-    if held is not solution:
-        listen.say(
-            Sentence(
-                "lights stay about as they are: larger changes lead away from the paint (",
-                Hint("literal", True),
-                " makes those of the least squares)",
-            )
-        )
-        solution = held
+    finish = partial(_finish_answer, job)
+    with stage("filter of the painting", listen):
+        solution = answer_without_filter(answer_as_multiplied(solution), finish)
+    solution = hold_to_current(solution, finish)
+    for remark in answer_remarks(solution):
+        listen.say(remark)
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
     scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
     solution = refine_by_rendering(
@@ -208,16 +201,9 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     return replace(solution, lighting=lighting)
 
 
-def _without_filter(job: Job, solution: Solution, listen: Listener) -> Solution:
-    """Return the answer to paintings without the filter of a render, and say where it had one."""
-    with stage("filter of the painting", listen):
-        found = answer_without_filter(solution, partial(job_bases.without_noise, job))
-    if found is not solution:
-        listen.say(
-            "the painting seems to be rendered with a wider reconstruction filter than a box: "
-            "the answer allows for its softer edges and halos"
-        )
-    return found
+def _finish_answer(job: Job, solution: Solution) -> Solution:
+    """Return an answer corrected for noise and for the primaries of a renderer."""
+    return answer_as_multiplied(job_bases.without_noise(job, solution))
 
 
 def _animated_answer(job: Job, bases: list[Basis], listen: Listener) -> JobAnswer:
@@ -304,6 +290,7 @@ def _finish_view(
         move_suggestion=rig.move,
         planes=rig.planes,
         surfaces=_surface_colors(scene, solution),
+        job_remarks=tuple(job.remarks),
     )
     # The files of the relit scene come to its final folder together with the report.
     with stage("report", listen, Sentence(" (", Hint("report", False), " skips it)")):

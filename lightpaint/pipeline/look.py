@@ -89,6 +89,7 @@ class Look:
             one surely helps.
         planes: What the answer gives on measuring planes; None without any.
         surfaces: Colours of objects under the answer and by daylight; none without spectra.
+        job_remarks: Remarks on scene, lights and painting, of before the solve.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -108,6 +109,7 @@ class Look:
     move_suggestion: MoveSuggestion | None = None
     planes: PlanesAnswer | None = None
     surfaces: tuple[SurfaceColor, ...] = ()
+    job_remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Look(of {self.target.name}: {self.verdict})"
@@ -271,6 +273,7 @@ def _reported_answer(look: Look, command: str) -> report.ReportedAnswer:
         color_choices=look.analysis.color_choices,
         planes=look.planes,
         surfaces=look.surfaces,
+        job_remarks=look.job_remarks,
     )
 
 

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         agreement, headline, spoken_distance, spoken_lack, spoken_missing, spoken_on_the_whole,
         spoken_reason, spoken_whole, verdict,
     )
-    from lightpaint.report.visible_emitters import emitter_remarks
+    from lightpaint.report.visible_emitters import answer_remarks, emitter_remarks
     # fmt: on
 
 if not TYPE_CHECKING:  # a type checker would take any name

@@ -40,7 +40,7 @@ class ReportedAnswer:
     turn: the turn of a spot that would help most, if any. appearance: the result of
     `compare_appearance`, if known. color_choices: the answers of other colours, if known. planes:
     what it gives on measuring planes, if there are any. surfaces: colours of objects under it, if
-    it has spectra.
+    it has spectra. job_remarks: remarks on scene, lights and painting.
     """
 
     basis: Basis
@@ -59,6 +59,7 @@ class ReportedAnswer:
     color_choices: Choices = ()
     planes: PlanesAnswer | None = None
     surfaces: Sequence[SurfaceColor] = ()
+    job_remarks: Sequence[str] = ()
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:

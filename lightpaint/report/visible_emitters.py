@@ -140,3 +140,24 @@ def _times(reached: float, goal: float) -> str:
     if goal <= 0:
         return "painted black"
     return f"{reached / goal:,.{0 if reached >= 10 * goal else 1}f} times"
+
+
+def answer_remarks(solution: Solution) -> list[Sentence]:
+    """Return remarks on what a solve made of its painting."""
+    problem, remarks = solution.problem, list[Sentence]()
+    if problem.filter_share:
+        remarks.append(
+            Sentence(
+                "the painting seems to be rendered with a wider reconstruction filter than a box: "
+                "the answer allows for its softer edges and halos"
+            )
+        )
+    if problem.holding is not None:
+        remarks.append(
+            Sentence(
+                "lights stay about as they are: larger changes lead away from the paint (",
+                Hint("literal", True),
+                " makes those of the least squares)",
+            )
+        )
+    return remarks

@@ -200,6 +200,13 @@ def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):
     assert chosen == ["painting", "answer"]
 
 
+def test_remarks_of_the_command_stand_in_the_page(make_basis: Any):
+    remarks = ("fog: <b>a light without a size</b>", "rendered with path")
+    page = Page(report_page(ReportedAnswer(**_result(make_basis), job_remarks=remarks)))
+    shown = [text for inside, text in page.texts if inside[-1:] == ("li",)]
+    assert [f"{remark}." for remark in remarks] == [x for x in shown if x.rstrip(".") in remarks]
+
+
 def test_names_are_text_whatever_they_are(make_basis: Any):
     evil = ("<script>alert(1)</script>", '"><img src=x onerror=y>', "a & b $title ${x}")
     result = _result(make_basis, names=evil, target="</title><b>'dusk'</b>")

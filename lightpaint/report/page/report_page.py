@@ -38,7 +38,7 @@ from lightpaint.report.page.lights_table import (
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
 from lightpaint.report.verdict_sentences import spoken_samples, verdict
-from lightpaint.report.visible_emitters import emitter_remarks
+from lightpaint.report.visible_emitters import answer_remarks, emitter_remarks
 from lightpaint.target import Target
 from lightpaint.version import __version__
 
@@ -151,6 +151,7 @@ def _texts(answer: measures.ReportedAnswer) -> dict[str, Any]:
         "meant": diagnosis_sentences.fit_sentence(solution),
         "verification": verification,
         "remarks": emitter_remarks(target, solution, predicted),
+        "job_remarks": [*answer.job_remarks, *answer_remarks(solution)],
         "fit": fit_table(solution),
         "verification_facts": verification_table(verification),
         "render_facts": render_table(basis, target, solution, predicted, verification),

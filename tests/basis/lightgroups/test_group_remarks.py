@@ -1,11 +1,13 @@
 """Remarks on missing groups and beauties name the renderer's setting that adds them."""
 
+import html
 from pathlib import Path
 
 import numpy as np
 import pytest
-from light_groups import interleaved, pictures
+from light_groups import channels, interleaved, pictures, write
 
+import lightpaint as lp
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.basis.lightgroups.naming_conventions import CONVENTIONS
 
@@ -62,3 +64,15 @@ def test_light_that_fast_gi_adds_is_the_rest(tmp_path: Path):
 
 def test_other_renderers_have_no_fast_gi(tmp_path: Path):
     assert "Fast GI" not in remarks(tmp_path, "Arnold", share=0.5)
+
+
+def test_remarks_on_groups_are_in_the_report(tmp_path: Path):
+    images = pictures(2)
+    layers = {"RGBA_a": images[0], "RGBA_b": images[1], "RGBA": images.sum(axis=0)}
+    groups = read_light_groups(interleaved(tmp_path / "shot.exr", layers))
+    painting = tmp_path / "painting.exr"
+    write(painting, ("rgb", channels("", 2 * images[0])))
+    lp.paint_with_light(None, painting, tmp_path / "out", basis=groups)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for remark in groups.remarks:
+        assert remark in html.unescape(page)
