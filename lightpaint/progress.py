@@ -175,11 +175,22 @@ class Announcement:
 
     def remark(self, spent_s: float, left_s: float | None, share: float) -> Sentence | None:
         """Return the remark if it is to be made now. share: of the steps that are done."""
-        if self._is_made or left_s is None or share < ESTIMATE_SHARE or spent_s + left_s <= LONG_S:
+        if left_s is None or share < ESTIMATE_SHARE:
+            return None
+        return self.of(spent_s + left_s)
+
+    def of(self, expected_s: float, advice: Sentence = NO_ADVICE) -> Sentence | None:
+        """Return the remark on work of so many seconds, if it is to be made.
+
+        advice: instead of the advice on all work of this label.
+        """
+        if self._is_made or expected_s <= LONG_S:
             return None
         self._is_made = True
-        duration = spoken_duration(spent_s + left_s)
-        return Sentence(f"{self._label} takes {duration} or more", self._advice)
+        duration = spoken_duration(expected_s)
+        is_plural = self._label.endswith("s") and not self._label.endswith("sis")
+        verb = "take" if is_plural else "takes"
+        return Sentence(f"{self._label} {verb} {duration} or more", advice or self._advice)
 
 
 class _Stage:
@@ -197,6 +208,12 @@ class _Stage:
         self._begin_s, self._announcement = time.monotonic(), Announcement(label, advice)
         #: Held by the loop that is reported.
         self.turn = Lock()
+
+    def announce(self, expected_s: float, advice: Sentence) -> None:
+        """Say how long the stage takes, if that is long; once."""
+        with self.voice:
+            if (remark := self._announcement.of(expected_s, advice)) is not None:
+                self.listen.say(remark)
 
     def report(self, pace: Pace, done: int, total: int, unit: str) -> None:
         """Report the steps of the loop, once the stage lasts long enough."""
@@ -249,6 +266,16 @@ def stage(
         yield
     finally:
         _STAGE.reset(token)
+
+
+def announce(expected_s: float, advice: Sentence = NO_ADVICE) -> None:
+    """Say how long the present stage takes, before its first step, if that is more than a minute.
+
+    expected_s: seconds, from an estimate of its own. advice: how to skip or shorten it.
+    """
+    current = _STAGE.get()
+    if current is not None:
+        current.announce(expected_s, advice)
 
 
 @contextmanager

@@ -14,7 +14,14 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.lines import OutputMode, using_output_mode
 from lightpaint.cli.output.terminal import TerminalListener
 from lightpaint.pipeline.job_bases import _RenderWatch
-from lightpaint.progress import Pace, cancellable, spoken_duration, stage, with_progress
+from lightpaint.progress import (
+    Pace,
+    announce,
+    cancellable,
+    spoken_duration,
+    stage,
+    with_progress,
+)
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.threads import (
     end_background_work,
@@ -272,3 +279,16 @@ def test_work_in_the_background_ends_with_the_command():
     assert begun.wait(PATIENCE_S)
     end_background_work()
     assert ended.wait(PATIENCE_S / 2)
+
+
+def test_a_stage_that_knows_its_time_says_so_before_its_first_step(clock: SimpleNamespace):
+    """Once, in place of the remark that follows from its steps, and with an advice of its own."""
+    reports = Reports()
+    announce(90)  # outside a stage nobody listens
+    with stage("analysis", reports, Sentence(": fewer pixels")):
+        announce(59)
+        assert reports.remarks == []
+        announce(600, Sentence(" (", Hint("error_bars", False), " skips it)"))
+        for _ in with_progress(range(100)):
+            clock.now_s += 6
+    assert reports.remarks == ["analysis takes 10 min or more (error_bars=False skips it)"]

@@ -42,6 +42,7 @@ WRONG = {
     "watts": (0, -5, math.nan, math.inf, "300", True),
     "verify": ("no", 0, None),
     "verify_spp": (1, 1.5, "many"),
+    "error_bars": ("no", 1, None),
     "report": ("no", 1, None),
     "command": (None, ["lightpaint"]),
 }
@@ -79,6 +80,7 @@ RIGHT = {
     "watts": (None, 300, 0.5),
     "verify": (True, False),
     "verify_spp": (None, 2, 64),
+    "error_bars": (True, False),
     "report": (True, False),
     "command": ("", "lightpaint solve a b"),
 }

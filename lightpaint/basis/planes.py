@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.errors import BasisError
-from lightpaint.progress import with_progress
+from lightpaint.progress import counting, with_progress
 from lightpaint.threads import one_thread, parallel_map
 
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
@@ -239,11 +239,12 @@ class PlanesBase:
         blocks = blocks_of(self, counted)
         length = max((block.size for block in blocks), default=0)
         rooms = Rooms(n, (n + 1) * (length + spare), kind)
-        with one_thread():
-            for block in with_progress(blocks):
+        # A block of a thousand lights takes a second: each of its channels is a step.
+        with one_thread(), counting(3 * len(blocks), "products") as advance:
+            for block in blocks:
                 where = as_slice(block, spare=spare)
                 light = _LightOf(self, where)
-                _add_products(gram, light, *squares(where, light.dense), rooms)
+                _add_products(gram, light, *squares(where, light.dense), rooms, advance)
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
 
@@ -307,9 +308,17 @@ class _LightOf:
 
 
 def _add_products(
-    gram: Doubles, light: _LightOf, weights: Floats, painted: Floats, rooms: Rooms
+    gram: Doubles,
+    light: _LightOf,
+    weights: Floats,
+    painted: Floats,
+    rooms: Rooms,
+    advance: Callable[[], None],
 ) -> None:
-    """Add the weighted products of lights and image, (3, n + 1, n + 1), over some pixels."""
+    """Add the weighted products of lights and image, (3, n + 1, n + 1), over some pixels.
+
+    advance: is called after each channel.
+    """
     n, kind = gram.shape[1] - 1, rooms.kind
     roots = np.broadcast_to(np.sqrt(weights, dtype=kind), painted.shape)
 
@@ -319,6 +328,7 @@ def _add_products(
         light.multiply(c, roots[:, c], block[:n])
         np.multiply(painted[:, c], roots[:, c], out=block[n], casting="same_kind")
         gram[c] += block @ block.T
+        advance()
 
     rooms.each_channel(add)
 

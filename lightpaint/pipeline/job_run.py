@@ -164,7 +164,9 @@ def answer_job(
     release_freed_memory()
     level_errors = () if placement is None else placement.level_errors
     with stage("analysis", listen, SOLVE_ADVICE):
-        analyses = analyse(solution, level_errors=level_errors)
+        analyses = analyse(
+            solution, level_errors=level_errors, has_error_bars=job.settings.error_bars
+        )
         on_planes = None
         if planes is not None and required is not None:
             on_planes = answer_on_planes(solution, planes, required)
@@ -219,7 +221,8 @@ def _animated_answer(job: Job, bases: list[Basis], listen: Listener) -> JobAnswe
     sweeps = max(max(solution.certificate.sweeps) for solution in solutions)
     listen.note(f"{len(solutions)} frames solved, each in at most {sweeps} sweeps")
     with stage("analysis", listen, SOLVE_ADVICE):
-        analyses = tuple(analyse(solution)[0] for solution in solutions)
+        has_error_bars = job.settings.error_bars
+        analyses = tuple(analyse(x, has_error_bars=has_error_bars)[0] for x in solutions)
     lighting = with_findings(solutions[0], analyses[:1]).lighting
     return JobAnswer(solutions[0], analyses, _with_keys(lighting, job.painted_frames, solutions))
 

@@ -1,5 +1,6 @@
 """Stages that take long: they show it, and Ctrl-C and `kill` wait for none of their steps."""
 
+import json
 import os
 import signal
 import subprocess
@@ -107,3 +108,19 @@ def test_a_file_that_takes_seconds_is_read_light_by_light(
     assert basis.origin == expected.origin
     for name in ("images", "half_differences", "emitters_seen"):
         assert getattr(basis, name).tobytes() == getattr(expected, name).tobytes()
+
+
+def test_no_error_bars_skips_them(folder: Path) -> None:
+    """The answer is the same, and says nothing of how sure it is."""
+    command = ["solve", "hall.basis.exr", "look.exr", "--literal", "-o"]
+    succeed(folder, *command, "sure")
+    succeed(folder, *command, "quick", "--no-error-bars")
+    sure, quick = (
+        json.loads((folder / name / "lighting.json").read_text())["lights"]
+        for name in ("sure", "quick")
+    )
+    for name, light in sure.items():
+        assert quick[name]["emission"] == light["emission"]
+        assert "standard_error" not in quick[name]
+    assert any("standard_error" in light for light in sure.values())
+    assert (folder / "quick" / "report.html").is_file()

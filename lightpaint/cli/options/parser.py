@@ -169,7 +169,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     answer_options.add_frames(parser)
     answer_options.add_method(parser)
     answer_options.add_verification(parser)
-    option_groups.add_fields(parser, Settings, "report")
+    option_groups.add_fields(parser, Settings, "error_bars", "report")
     answer_options.add_tolerances(parser)
     option_groups.add_fields(parser, Settings, "cd_per_unit", "planes", "watts", "ignore_wishes")
     option_groups.add_lights(parser)

@@ -2,6 +2,7 @@
 blocks; and SciPy's LAPACK and BLAS, where unknowns are many.
 """
 
+import time
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -139,6 +140,13 @@ def sandwich(A: Doubles, B: Doubles) -> Doubles:
 
 def _sandwich(A: Doubles, B: Doubles) -> Doubles:
     return np.asarray(A @ B @ A)
+
+
+def product_s(M: Doubles) -> float:
+    """Return the seconds that a product of a matrix with itself takes here and now."""
+    begin_s = time.monotonic()
+    np.matmul(M, M)
+    return time.monotonic() - begin_s
 
 
 def _is_below(M: Doubles, limit: float) -> bool:

@@ -207,13 +207,18 @@ class Analysis:
 
 @keywords()
 def analyse(
-    solution: Solution, *, level_errors: Sequence[tuple[str, RGB]] = ()
+    solution: Solution,
+    *,
+    level_errors: Sequence[tuple[str, RGB]] = (),
+    has_error_bars: bool = True,
 ) -> tuple[Analysis, ...]:
     """Analyse the answer to each view.
 
     Args:
         solution: Of one view or of several.
         level_errors: As of `error_bars`.
+        has_error_bars: Whether to estimate the uncertainty, which of thousands of lights takes
+            minutes.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -224,7 +229,12 @@ def analyse(
     views = solution.views
     jobs: list[tuple[str, Callable[[], Any]]] = [
         *(("comparison", partial(_appearance_and_diagnosis, view)) for view in views),
-        ("error bars", partial(error_bars, solution, level_errors=level_errors)),
+        (
+            "error bars",
+            partial(error_bars, solution, level_errors=level_errors)
+            if has_error_bars
+            else lambda: None,
+        ),
         ("answers in other colours", partial(best_by_colors, solution)),
         ("similar lights", partial(_ambiguities, solution)),
         *(("answer without constraints", partial(without_constraints, x)) for x in views),

@@ -74,6 +74,8 @@ class Settings(Fit):
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
         verify_spp: Samples per pixel of the verification on the whole film, instead of that limit.
+        error_bars: Whether to estimate how far noise may move each light, which of thousands of
+            lights takes minutes.
         report: Whether to write report.html and comparison.png beside the numbers.
         force: Whether to replace results of another painting, or ones changed by hand.
         command: The shell command of this solve, for the report.
@@ -320,6 +322,16 @@ class Settings(Fit):
             theme="Verification",
         ),
     ] = None
+    error_bars: Annotated[
+        bool,
+        validation.Option(
+            "--no-error-bars",
+            "do not estimate how far noise may move each light, which of thousands of lights "
+            "takes minutes",
+            default="estimate it",
+            theme="Results",
+        ),
+    ] = True
     report: Annotated[
         bool,
         validation.Option(
@@ -433,6 +445,7 @@ class SettingsByName(TypedDict, total=False):
     ignore_wishes: bool
     verify: bool
     verify_spp: int | None
+    error_bars: bool
     report: bool
     force: bool
     command: str

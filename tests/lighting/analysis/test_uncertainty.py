@@ -27,6 +27,7 @@ from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.default_solve import solve
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.progress import stage
 from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
@@ -362,6 +363,30 @@ def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
     )
 
 
+def test_error_bars_of_thousands_of_lights_say_first_how_long_they_take(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remarks: list[Any] = []
+
+    class Remarks:
+        def __call__(self, *_: Any) -> None:
+            pass
+
+        def say(self, text: str) -> None:
+            remarks.append(text)
+
+    rng = np.random.default_rng(0)
+    basis = make_basis(2, (6, 8), half_differences=rng.normal(0, 0.01, (2, 6, 8, 3)))
+    solution = solve(basis, Target("t", basis.current_look, np.ones((6, 8)), everything=True))
+    seconds = iter([0.1, 3.0])
+    monkeypatch.setattr(uncertainty, "product_s", lambda _: next(seconds))
+    for limit in (2, 1, 1):
+        monkeypatch.setattr(uncertainty, "QUICK_MATRIX", limit)
+        with stage("error bars", Remarks()):
+            error_bars(solution)
+    assert remarks == ["error bars take 9 min or more (error_bars=False skips them)"]
+
+
 def test_pseudo_inverse_leaves_out_what_changes_nothing():
     M = np.diag([1e8, 1e-8, 0.0])
     np.testing.assert_allclose(pseudo_inverse(M), np.diag([1e-8, 1e8, 0]), rtol=1e-12)
@@ -655,7 +680,8 @@ def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light(
     )
     corrected = denoised_matrix(NormalEquations(M, np.zeros((3, 12)), np.zeros(3)), power)
     doubts = np.clip(rng.uniform(-0.5, 1.3, (12, 3)), 0, 1)
-    weakest = weakest_matrix(M, noise, doubts, corrected)  # type: ignore[arg-type]
+    own_inverse = np.array([np.diag(pseudo_inverse(x)) for x in M])
+    weakest = weakest_matrix(M, own_inverse, noise, doubts, corrected)  # type: ignore[arg-type]
     expected = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
         noisy, alone = (1 / pseudo_inverse(x[c])[k, k] for x in (M, expected))

@@ -37,6 +37,7 @@ from lightpaint.basis import FEW_LIGHTS
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
+from lightpaint.lighting.algebra.symmetric_matrices import QUICK_MATRIX, product_s
 from lightpaint.lighting.analysis.noise.basis_noise import (
     Noise,
     denoised_matrix,
@@ -53,7 +54,15 @@ from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import ViewsReading, are_sketches
 from lightpaint.lighting.solution import Solution
-from lightpaint.progress import with_progress
+from lightpaint.progress import announce, with_progress
+from lightpaint.sentences import Hint, Sentence
+
+#: Time of error bars of many lights, in products of two matrices of as many rows as lights, by
+#: measurement: in a hall of 1000 lights 175.
+MATRIX_PRODUCTS = 175
+
+#: How to leave out error bars.
+SKIPPING = Sentence(" (", Hint("error_bars", False), " skips them)")
 
 #: Pairs of readings of a painting, and of one for many lights, whose solves take long.
 PAIRS, FEW_PAIRS = 4, 2
@@ -166,32 +175,37 @@ def _answer_to_reading(solution: Solution, wash: Wash) -> Doubles:
     return solve_for(replace(solution, problem=replace(problem, **vars(terms))), problem.solved)
 
 
-def noise_doubts(solution: Solution, power: Doubles) -> Doubles:
+def noise_doubts(solution: Solution, power: Doubles, own_inverse: Doubles) -> Doubles:
     """Return the doubt in each light, (n, 3), 0 to 1: whether it may be noise alone.
 
     It follows from the share of noise in the part of a light that no other can replace. power:
-    (3, n, n), the noise in M.
+    (3, n, n), the noise in M. own_inverse: (3, n), the diagonals of the inverse of M.
     """
     shares = np.zeros(solution.weights.shape)
-    for c, M in enumerate(solution.equations.M):
-        shares[:, c] = np.diag(power[c]) * np.diag(pseudo_inverse(M))
+    for c, of_channel in enumerate(own_inverse):
+        shares[:, c] = np.diag(power[c]) * of_channel
     low, high = DOUBT_RANGE
     is_determined = solution.reached & ~solution.basis.is_fixed[:, None]
     return np.where(is_determined, np.clip((shares - low) / (high - low), 0, 1), 0)
 
 
-def weakest_matrix(M: Doubles, noise: Noise, doubts: Doubles, corrected: Doubles) -> Doubles:
+def weakest_matrix(
+    M: Doubles,
+    own_inverse: Doubles,
+    noise: Noise,
+    doubts: Doubles,
+    corrected: Doubles,
+) -> Doubles:
     """Return M, (3, n, n), without noise, as weak as it may be for lights in doubt, (n, 3).
 
-    corrected: (3, n, n), M without as much of it as is safe to remove. Returns (3, n, n), positive
-    semidefinite.
+    own_inverse: as of `noise_doubts`. corrected: (3, n, n), M without as much of it as is safe to
+    remove. Returns (3, n, n), positive semidefinite.
     """
     weakest = corrected.copy()
     in_doubt = np.flatnonzero((doubts > 0).any(axis=1)).tolist()
     if not in_doubt:
         return weakest
     # The power that no other light can replace is 1 over the diagonal of the inverse.
-    noisy_inverse = [np.diag(pseudo_inverse(x)) for x in M]
     inverse = [_GrowingInverse(pseudo_inverse(x)) for x in weakest]
     # A light that others replace exactly has no part of its own which could be weaker.
     is_own = [
@@ -201,7 +215,7 @@ def weakest_matrix(M: Doubles, noise: Noise, doubts: Doubles, corrected: Doubles
         for c in (c for c in np.flatnonzero(doubts[k] > 0) if is_own[c][k]):
             # Only the part that no other light can replace may shrink.
             column = inverse[c].column(k)
-            noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(column[k])
+            noisy, alone = 1 / float(own_inverse[c][k]), 1 / float(column[k])
             least = max(
                 noisy - float(noise.power[c, k, k]) - SAFE_ERRORS * float(noise.power_error[c, k]),
                 alone - float(weakest[c, k, k]) + float(noise.least_power[c, k]),
@@ -333,6 +347,8 @@ def error_bars(
     problem, weights = solution.problem, solution.weights
     if not problem.basis.knows_noise:
         return None
+    if len(weights) > QUICK_MATRIX:
+        announce(MATRIX_PRODUCTS * product_s(problem.equations.M[0]), SKIPPING)
     noise = noise_sums(solution, removed=1.0)
     if len(weights) > FEW_LIGHTS:
         release_freed_memory()
@@ -354,9 +370,12 @@ def error_bars(
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
         unsteady = solve_for(solution, bent) - weights - bias
-    doubts = noise_doubts(solution, noise.power)
+    matrices = solution.equations.M
+    channels = with_progress(list(matrices), "channels")
+    own_inverse = np.array([np.diag(pseudo_inverse(x)) for x in channels])
+    doubts = noise_doubts(solution, noise.power, own_inverse)
     if doubts.any():
-        weak = weakest_matrix(solution.equations.M, noise, doubts, unbiased.M)
+        weak = weakest_matrix(matrices, own_inverse, noise, doubts, unbiased.M)
         # A step from a render of the mix depends on M alone.
         is_refined = problem.refinement is not None
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)

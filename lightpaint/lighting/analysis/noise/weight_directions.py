@@ -24,6 +24,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.unknown_blocks import Block
+from lightpaint.progress import with_progress
 
 #: Relative distance at which a sum counts as at its limit.
 AT_LIMIT = 1e-9
@@ -393,7 +394,8 @@ class WeightResponse:
         pulled = problem.with_pull(scatters)
         self._missed, self._levels = problem.equations.M, _levels(solution)
         self._blocks = [
-            BlockResponse.of(room, pulled, gradient) for room in block_freedoms(solution, pulled)
+            BlockResponse.of(room, pulled, gradient)
+            for room in with_progress(list(block_freedoms(solution, pulled)))
         ]
 
     def spread(self, covariance: Doubles) -> WeightSpread:
@@ -401,7 +403,7 @@ class WeightResponse:
         n, missed = len(self._levels), self._missed
         free, below, above = np.zeros((3, n, 3))
         excess, is_far = np.zeros(3), np.zeros(n, bool)
-        for response in self._blocks:
+        for response in with_progress(self._blocks):
             block, emitted = response.room.block, response.room.emitted
             active = response.room.active
             ends, of_unknowns = response.propagate(block.covariance(covariance))
