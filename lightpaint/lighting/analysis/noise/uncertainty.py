@@ -159,10 +159,8 @@ def _steady_wash(blocks: Sequence[NoisyBlocks]) -> Wash:
     """Return the wash of views with the wishes that they show against a steadier look."""
     washes = []
     for view in blocks:
-        look, counted = view.blocks.look, (view.blocks.counts > 0)[..., None].astype(np.float64)
-        steady, _ = steadier_light(
-            *(x.astype(np.float64) for x in (look, view.look_noise)), counted
-        )
+        look, noise = (x.astype(np.float64) for x in (view.blocks.read_look, view.read_noise))
+        steady, _ = steadier_light(look, noise, (view.blocks.counts > 0)[..., None].astype(float))
         washes.append(view.blocks.wash_in(steady.astype(np.float32)))
     return Wash.joined(washes)
 
