@@ -392,7 +392,7 @@ class Basis(Shown):
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32; of light groups whose renderer multiplies
-        in other primaries, what that shows (see `working_primaries.py`).
+        in other primaries, what that shows.
 
         weights: (n, 3), as lights are ordered, finite. Raises BasisError for others.
         """

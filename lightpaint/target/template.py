@@ -284,7 +284,7 @@ def find_template(painting: Path) -> Path | None:
         x.parent for x in folder.glob(f"*/{RECORD_FILE}") if x.with_name(SHOWN_FILE).is_file()
     ]
     places = (folder, folder / "template", *(beside if len(beside) == 1 else ()), Path("template"))
-    # What has its name is no absent one, be it a pipe, or a link that leads nowhere.
+    # What has its name is not absent, be it a pipe, or a link that leads nowhere.
     return next((place for place in places if os.path.lexists(place / RECORD_FILE)), None)
 
 

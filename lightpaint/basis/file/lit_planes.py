@@ -29,8 +29,8 @@ from lightpaint.basis.file.lit_strips import (
     StripsInFile,
     StripsInMemory,
     WholePlanes,
+    append_array,
     mapped_array,
-    write_array,
 )
 from lightpaint.basis.planes import LitEntries
 from lightpaint.images import block_sums
@@ -365,7 +365,7 @@ class LitCollector:
 
         def of_file(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
             nonlocal end
-            first, end = end, write_array(file, end, array)
+            first, end = end, append_array(file, end, array)
             return mapped_array(file, first, array.dtype, array.size).reshape(array.shape)
 
         for key in self._in_memory:

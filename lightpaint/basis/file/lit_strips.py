@@ -153,7 +153,7 @@ class StripsInFile:
             places = []
             for array in (strip.lit, strip.numbers):
                 places.append(end)
-                end = write_array(self._file, end, array)
+                end = append_array(self._file, end, array)
             lit, numbers = strip.lit[:0].copy(), strip.numbers[:, :0].copy()
             self._strips.append((replace(strip, lit=lit, numbers=numbers), places[0], places[1]))
             self.lit_count += strip.lit.size
@@ -184,7 +184,7 @@ class StripsInFile:
         return found
 
 
-def write_array(file: TemporaryArray, first: int, array: npt.NDArray[Any]) -> int:
+def append_array(file: TemporaryArray, first: int, array: npt.NDArray[Any]) -> int:
     """Write the bytes of an array from a number of a file on; return the number after them."""
     words = np.zeros(-(-array.nbytes // 4), np.float32)
     words.view(np.uint8)[: array.nbytes] = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
@@ -195,7 +195,7 @@ def write_array(file: TemporaryArray, first: int, array: npt.NDArray[Any]) -> in
 def mapped_array(
     file: TemporaryArray, first: int, kind: npt.DTypeLike, count: int
 ) -> npt.NDArray[Any]:
-    """Return an array, (count,), of which `write_array` wrote the bytes, as part of the file."""
+    """Return an array, (count,), of which `append_array` wrote the bytes, as part of the file."""
     words = -(-count * np.dtype(kind).itemsize // 4)
     return np.asarray(file.array[first : first + words]).view(kind)[:count]
 

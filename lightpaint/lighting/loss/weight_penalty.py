@@ -457,7 +457,7 @@ def restrain_lights(
     all channels cost the same, so that the price is none on a light's colour.
 
     reference: (n, 3), the weights p that the look has. unpainted: ū, the weight of each unpainted
-    pixel; with a weaker hold than LEAST_HOLD, ū is that of LEAST_HOLD.
+    pixel; with a weaker hold than LEAST_HOLD, ū is as with LEAST_HOLD.
     """
     painted = wash.counts * np.minimum(wash.importance, 1)
     counts = wash.counts - painted

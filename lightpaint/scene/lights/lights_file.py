@@ -219,7 +219,7 @@ def lights_file_for(
 ) -> LightsFile:
     """Return the content of `path_given`, or else of the file beside `scene` if permitted.
 
-    Whatever has the name of that file is read: a link that leads nowhere is no absent file.
+    Whatever has the name of that file is read: a link that leads nowhere is not absent.
     """
     if path_given is not None:
         return read_lights_file(Path(path_given))

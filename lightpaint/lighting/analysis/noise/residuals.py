@@ -247,7 +247,7 @@ def _fill_gradients(
 
 
 @dataclass(frozen=True)
-class _Band:
+class _RowBand:
     """Rows of a view, as pixels of the long picture of all views.
 
     own: their pixels. around: these, and the rows beside them that their steadier light depends on.
@@ -279,7 +279,7 @@ class _Band:
         return _Steadied(picture, steady, own, np.sqrt(1 - np.square(share)) * own)
 
 
-def _bands_of_views(solution: Solution) -> Iterator[list[_Band]]:
+def _bands_of_views(solution: Solution) -> Iterator[list[_RowBand]]:
     """Yield the bands of each view."""
     views, first = solution.problem.views, 0
     sizes = [basis.size for basis in views.bases]
@@ -291,7 +291,7 @@ def _bands_of_views(solution: Solution) -> Iterator[list[_Band]]:
                 slice(first + width * a, first + width * b)
                 for a, b in ((rows.start, rows.stop), (top, bottom))
             )
-            bands.append(_Band(own, around, slice(rows.start - top, rows.stop - top), width))
+            bands.append(_RowBand(own, around, slice(rows.start - top, rows.stop - top), width))
         yield bands
         first += height * width
 
@@ -327,7 +327,7 @@ class _Steadied:
 
     @property
     def distance(self) -> Doubles:
-        """Of the picture from the steadier light, (3, p)."""
+        """The distance of the picture from the steadier light, (3, p)."""
         return self.picture - self.steady
 
     def part(self, strip: slice) -> "_Steadied":
