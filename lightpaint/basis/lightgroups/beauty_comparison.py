@@ -189,10 +189,10 @@ class LayerSum:
         return float(np.maximum(excess, 0).sum() / size) if size else float("inf")
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
-        """Return True if the sum equals that picture, and the picture is not black.
+        """Return True if the layers of the sum add up to a picture that is not black.
 
-        less_itself: whether the picture is one of the layers in the sum, and is to be removed from
-        it.
+        less_itself: whether the picture itself is among these layers, so that the others are to add
+        up to it.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
         largest_share = max(self.share, negligible_share([beauty])) * size

@@ -290,10 +290,11 @@ def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> O
 
 @dataclass(frozen=True)
 class MissingLight:
-    """The difference between the groups and the beauty.
+    """The difference between the groups and the beauty, the picture with all lights.
 
-    rest: (h, w, 3), None if it is within rounding. share, exceeding: shares of the beauty, None
-    without one. remark: the difference in words.
+    rest: (h, w, 3), the beauty less the sum of the groups; None if it is within rounding. share: of
+    the beauty that the groups lack. exceeding: by how much of it they are brighter; both None
+    without a beauty. remark: the difference in words.
     """
 
     rest: Floats | None

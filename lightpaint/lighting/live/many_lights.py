@@ -192,7 +192,9 @@ class ManyLights:
         return np.argsort(-gains.sum(axis=1), kind="stable")
 
     def settle(self, lights: Indices, gradient: Doubles) -> None:
-        """Note that some lights have been moved. gradient: theirs since then, (m, 3)."""
+        """Note that the weights of some lights have changed. gradient: the one of the objective by
+        these weights, after the change, (m, 3).
+        """
         self._settled[lights], self._has_moved[lights] = gradient, True
 
     @one_thread()

@@ -182,9 +182,9 @@ class EstimatePlaces(Request, kind="estimate_place"):
 
 @dataclass(frozen=True)
 class TieLights(Request, kind="tie"):
-    """The lights that share a dimmer: all such groups, of names. Answered by `answer`.
+    """Say which lights share a dimmer; ties that are left out end. Answered by `answer`.
 
-    ties: groups of names of lights.
+    ties: all groups of such lights, by their names.
     """
 
     ties: tuple[tuple[str, ...], ...]

@@ -72,9 +72,9 @@ class TaskStopped(Event, kind="stopped"):
 class ExportResult(Event, kind="exported", is_observed=True):
     """Files that were written. Unasked.
 
-    command: solves for the exported paintings; "" for none. is_stopped: whether the export was
-    stopped before its end. is_unpainted: whether files that need a painting were left out. files:
-    their paths.
+    command: the command line that solves for the exported paintings; "" for none. is_stopped:
+    whether the export was stopped before its end. is_unpainted: whether files that need a painting
+    were left out. files: their paths.
     """
 
     files: tuple[str, ...]

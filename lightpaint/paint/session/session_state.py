@@ -58,8 +58,8 @@ def offer_view(
     """Offer the pictures of a view; rough planes replace denoised ones until these are made.
 
     basis: of the view, with every light at its place in the scene. clean: of the size that the page
-    has. small: planes of pixel blocks, which improve the rough ones. Very many come as they are
-    until they are denoised.
+    has. small: planes of pixel blocks, which improve the rough ones. Planes of very many lights are
+    offered as they were rendered until they are denoised.
     """
 
     def offer(name: str, make: Any) -> None:

@@ -151,12 +151,15 @@ def _added(solution: Solution, image: Floats) -> Doubles:
 
 
 def _dot(D: Doubles, x: FilterEffect, y: FilterEffect) -> float:
-    """Return Σ D (x y − x′ y′)."""
+    """Return Σ D (x y − x′ y′), an estimate of Σ D x y without the noise of both.
+
+    x′, y′: their half differences. D: (p, 3), weights.
+    """
     return float((D * (x.image * y.image - x.half * y.half)).sum())
 
 
 def _light_sums(solution: Solution, D: Doubles, pictures: Sequence[FilterEffect]) -> list[Doubles]:
-    """Return Σ D (Φ x − Φ′ x′) of some pictures x, (3, n) each."""
+    """Return Σ D (Φ x − Φ′ x′) of some pictures x, (3, n) each: `_dot` with each light's image Φ."""
     basis, counted = solution.basis, np.flatnonzero(solution.importance > 0)
     sums = [np.zeros((3, len(basis.lights))) for _ in pictures]
     step, _ = block_of(basis.planes)

@@ -327,7 +327,7 @@ class _Steadied:
 
     @property
     def distance(self) -> Doubles:
-        """The distance of the picture from the steadier light, (3, p)."""
+        """The difference of the picture from the steadier light, (3, p)."""
         return self.picture - self.steady
 
     def part(self, strip: slice) -> "_Steadied":
