@@ -159,7 +159,7 @@ def _dot(D: Doubles, x: FilterEffect, y: FilterEffect) -> float:
 
 
 def _light_sums(solution: Solution, D: Doubles, pictures: Sequence[FilterEffect]) -> list[Doubles]:
-    """Return Σ D (Φ x − Φ′ x′) of some pictures x, (3, n) each: `_dot` with each light's image Φ."""
+    """Return Σ D (Φ x − Φ′ x′) of pictures x, (3, n) each: `_dot` with each light's image Φ."""
     basis, counted = solution.basis, np.flatnonzero(solution.importance > 0)
     sums = [np.zeros((3, len(basis.lights))) for _ in pictures]
     step, _ = block_of(basis.planes)
