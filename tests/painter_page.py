@@ -24,6 +24,7 @@ class Painter:
             """async () => {
               const frame = () => new Promise((done) => requestAnimationFrame(done));
               do {
+                window.painter.store.flush(); // what waits for the next change
                 for (let k = 0; k < 2; k += 1) await frame();
                 await new Promise((done) => setTimeout(done, 20));
               } while (window.host.busy);

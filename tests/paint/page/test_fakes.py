@@ -45,9 +45,10 @@ ASKED = {
     "take_over": {},
 }
 
-#: Requests of a rig, layers and a selection, which the session that tests make up does not have.
+#: Requests of a rig, layers, a selection and lamps, which the session that tests make up lacks.
 RIG = {"move", "point", "place", "add_light", "remove_light", "change_layers", "select"}
-RIG |= {"estimate_place", "compare_looks", "import_layers", "add_reference"}
+RIG |= {"estimate_place", "compare_looks", "import_layers", "add_reference", "mix"}
+RIG |= {"start_from_lamps", "switch_console", "black_out"}
 
 
 def check(message: dict[str, Any]) -> None:

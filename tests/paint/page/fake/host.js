@@ -100,6 +100,7 @@ export class FakeHost {
           size: [room.h, room.w],
           objects: room.objects,
           scales: room.lights.map(() => 1),
+          plane_size: [room.h, room.w],
         },
       ],
       lights: room.lights.map(({ name, present }, k) => ({
