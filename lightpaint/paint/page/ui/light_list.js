@@ -47,7 +47,7 @@ export function LightList({ ui, app }) {
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${ui.lights.length > 1 && html`<${MasterDimmer} ui=${ui} app=${app} />`}
     <${ConsoleRow} ui=${ui} app=${app} />
-    <${StartLamps} ui=${ui} app=${app} />
+    ${ui.isStarted && html`<${StartLamps} ui=${ui} app=${app} />`}
     ${
       ui.lights.length > 1 &&
       html`<div class="lights-tools">
@@ -73,6 +73,7 @@ export function LightList({ ui, app }) {
         : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} app=${app}
           members=${members} isMany=${isMany} />`,
     )}
+    ${!ui.isStarted && html`<${StartLamps} ui=${ui} app=${app} />`}
   </div>`;
 }
 

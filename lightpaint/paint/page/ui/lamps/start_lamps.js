@@ -19,7 +19,8 @@ const CURVE = {
     Number((LEAST * (MOST / LEAST) ** (percent / 100)).toPrecision(3)),
 };
 
-/** @param {{ui: Ui, app: App}} props */
+/** The slider of the start; before it, the offer, which comes below the lights, where it moves no row.
+ * @param {{ui: Ui, app: App}} props */
 export function StartLamps({ ui, app }) {
   const { session } = app;
   if (!ui.isStarted)
