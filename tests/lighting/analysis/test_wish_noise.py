@@ -12,6 +12,7 @@ from scipy.stats import norm, t
 import lightpaint as lp
 from lightpaint.lighting.analysis.noise import uncertainty
 from lightpaint.lighting.analysis.noise.uncertainty import ReadingNoise
+from lightpaint.lighting.loss import expected_lights
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, PaintedBlocks, Wash
 from lightpaint.target.wish_finding import DISTINCT_STOPS, find_wishes
 
@@ -78,6 +79,22 @@ def test_intervals_of_a_sketch_hold_whatever_wishes_noise_shows(
     unread = ReadingNoise(*np.zeros((3, *best.shape)), 4)
     monkeypatch.setattr(uncertainty.ReadingNoise, "of", lambda _solution: unread)
     assert share_held() < least - 0.3
+
+
+def test_wishes_are_found_under_the_look_that_is_read(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Noise of the look alone finds and loses wishes: without it, all seeds show the same."""
+    target = _sketch()
+
+    def counts() -> set[int]:
+        bases = [_noisy_basis(make_basis, seed) for seed in range(SEEDS)]
+        return {len(PaintedBlocks.of(basis, target).wash.wishes) for basis in bases}
+
+    assert len(counts()) > 1
+    clean = make_basis(images=_pools(), emission=np.ones((4, 3))).current_look
+    monkeypatch.setattr(expected_lights, "read_look", lambda _basis: clean)
+    assert counts() == {len(find_wishes(target, clean))}
 
 
 def test_a_literal_painting_and_one_without_noise_are_read_in_one_way(make_basis: Any) -> None:
