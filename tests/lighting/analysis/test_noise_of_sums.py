@@ -5,7 +5,7 @@ import pytest
 
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.analysis.noise.noise_of_sums import covariance_of_sums
-from lightpaint.lighting.analysis.noise.painting_filter import filtered
+from lightpaint.lighting.analysis.noise.reconstruction_filter import filtered
 
 SIZE, SEEDS = (48, 64), 60
 TOLERANCE = 4 * np.sqrt(2 / (10 * SEEDS))

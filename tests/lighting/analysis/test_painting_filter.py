@@ -9,7 +9,7 @@ from renderer import LIGHTS, write_room
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.noise.painting_filter import TAP, filtered
+from lightpaint.lighting.analysis.noise.reconstruction_filter import TAP, filtered
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZE = (48, 64)

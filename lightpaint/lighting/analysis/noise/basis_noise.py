@@ -295,9 +295,9 @@ class NoisyPixels:
             mixed = self.residuals.half[pixels, c].astype(kind)
             of_noise = D * mixed + half
             of_light, doubt = (x[pixels, c].astype(kind) for x in (of_pixels.bend, of_pixels.doubt))
-        elif self.residuals.current is not None:
-            shared = D * self.share[pixels, c % self.share.shape[1]]
-            of_noise = (shared * self.residuals.current[pixels, c]).astype(kind)
+        else:
+            of_target = self._target_noise(pixels, c)
+            of_noise = None if of_target is None else (D * of_target).astype(kind)
         return ChannelPixels(
             c=c,
             D=D,
@@ -313,6 +313,16 @@ class NoisyPixels:
             of_light=of_light,
             doubt=doubt,
         )
+
+    def _target_noise(self, pixels: slice | Indices, c: int) -> Doubles | None:
+        """Return the half differences of a channel of Ψ at some pixels, (p,); None without any."""
+        residuals, noise = self.residuals, None
+        if residuals.current is not None:
+            noise = self.share[pixels, c % self.share.shape[1]] * residuals.current[pixels, c]
+        if residuals.unfiltered is not None:
+            unfiltered = residuals.unfiltered[pixels, c]
+            noise = unfiltered if noise is None else noise + unfiltered
+        return None if noise is None else np.asarray(noise, np.float64)
 
     def _rows_of(self, pixels: slice | Indices) -> RowsOf:
         """Return the function for the rows of a channel of some pixels: of their lit ones alone,

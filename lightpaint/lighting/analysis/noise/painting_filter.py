@@ -26,19 +26,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles
 from lightpaint.basis import as_slice, block_of
 from lightpaint.lighting.analysis.noise.painting_noise import painting_grain
+from lightpaint.lighting.analysis.noise.reconstruction_filter import added_by_filter
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.analysis.noise.weight_directions import solve_for
-from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.problem import Problem, ViewsReading
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
 from lightpaint.progress import with_progress
-
-#: Share of Mitsuba's Gaussian, whose standard deviation is half a pixel, that lies in each of both
-#: neighbours along an axis: beyond one standard deviation.
-TAP = (1 - math.erf(math.sqrt(0.5))) / 2
 
 #: Least share of the residual beside noise that the filter of a render explains.
 MIN_EXPLAINED = 0.8
@@ -95,18 +92,25 @@ def answer_without_filter(
 
 
 def _without(problem: Problem, change: Doubles, share: float) -> Problem:
-    """Return the problem of the paintings less a change, (p, 3), before it is solved."""
+    """Return the problem of the paintings less a change, (p, 3), before it is solved.
+
+    What they ask for is read anew, but no contrast counts by itself: nobody painted a render, and
+    what is left of its filter would be taken for wishes.
+    """
     views, joint = problem.views, change.reshape(*problem.loss.importance.shape, 3)
     images = [
         np.maximum(target.image - views.part(joint, k), 0).astype(np.float32)
         for k, target in enumerate(views.targets)
     ]
+    other = problem.with_paintings(images)
+    terms = ViewsReading(other.views, other.power, other.reference, other.fit).terms()
     return replace(
-        problem.with_paintings(images),
+        other,
         reduction=problem.full,
         corrected=None,
         noise_removed=0.0,
         filter_share=share,
+        **vars(replace(terms, contrast=None)),
     )
 
 
@@ -121,7 +125,7 @@ def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, F
     missed = FilterEffect(residuals.residual(everything), -residuals.noise(everything))
     D = np.broadcast_to(D, missed.image.shape)
     grain = painting_grain(solution, D, missed.image, missed.half)
-    h = FilterEffect(*(_added(solution, x) for x in (residuals.predicted, residuals.half)))
+    h = FilterEffect(*(added_by_filter(solution, x) for x in (residuals.predicted, residuals.half)))
     if taken is not None:
         missed = FilterEffect(missed.image + taken.image, missed.half + taken.half)
     product, power = _dot(D, h, missed), _dot(D, h, h)
@@ -141,13 +145,6 @@ def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, F
         return None
     share = min(by_filter / own, 1.0)
     return (share, h) if share * product > MIN_EXPLAINED * lacking else None
-
-
-def _added(solution: Solution, image: Floats) -> Doubles:
-    """Return what the filter adds to a picture of all views, (p, 3)."""
-    views, size = solution.problem.views, solution.importance.shape
-    parts = [views.part(image.reshape(*size, 3), k).astype(np.float64) for k in range(len(views))]
-    return np.asarray(views.join([filtered(x) - x for x in parts]).reshape(-1, 3))
 
 
 def _dot(D: Doubles, x: FilterEffect, y: FilterEffect) -> float:
@@ -178,12 +175,3 @@ def _error_by(solution: Solution, gradient: Doubles) -> Doubles:
     solved = solution.problem.solved
     moved = replace(solved, b=solved.b + gradient)
     return np.asarray(solve_for(solution, moved) - solve_for(solution, solved))
-
-
-def filtered(image: Doubles) -> Doubles:
-    """Return a picture with a box filter, (h, w, …), with a Gaussian one."""
-    for axis in (0, 1):
-        lines = np.moveaxis(image, axis, 0)
-        wide = np.concatenate([lines[:1], lines, lines[-1:]])
-        image = np.moveaxis((1 - 2 * TAP) * lines + TAP * (wide[:-2] + wide[2:]), 0, axis)
-    return image

@@ -32,6 +32,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.images import bands_of, box_mean, enlarged
+from lightpaint.lighting.analysis.noise.reconstruction_filter import added_by_filter
 from lightpaint.lighting.loss.pixel_loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution
 
@@ -74,11 +75,13 @@ MIN_INDEPENDENT = 0.5
 class Residuals:
     """The residual of an answer, and the noise of its prediction, for any pixels.
 
-    The noise is Σ w_i h_i minus the part that Ψ shares where it equals the current look.
+    The noise is Σ w_i h_i minus the part that Ψ shares where it equals the current look, or where
+    the filter of a prediction was taken out of it.
 
     image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. current: (p, 3), noise
     of the current look; None where nothing follows it. share: (p, 1) or (p, 3), as far as it does;
-    None where `half` has that already.
+    None where `half` has that already. unfiltered: (p, 3), half differences that Ψ has without its
+    filter; None of paintings as they are.
     """
 
     image: Floats
@@ -86,6 +89,7 @@ class Residuals:
     half: Floats
     current: Floats | None
     share: Floats | None
+    unfiltered: Doubles | None = None
 
     @classmethod
     def of(cls, solution: Solution) -> "Residuals":
@@ -99,16 +103,20 @@ class Residuals:
             half = r.noise + basis.noise.mix(weights - r.before)
         image, mixed, half = (x.reshape(-1, 3) for x in (solution.image, predicted.image, half))
         is_shared = current is not None and r is None
-        shared = share.reshape(-1, share.shape[2]) if is_shared else None
-        return cls(image, mixed, half, current, shared)
+        shared, unfiltered = share.reshape(-1, share.shape[2]) if is_shared else None, None
+        if problem.filter_share and r is None:
+            unfiltered = -problem.filter_share * added_by_filter(solution, half)
+        return cls(image, mixed, half, current, shared, unfiltered)
 
     def residual(self, pixels: slice | Indices) -> Doubles:
         """Return Ψ − Σ w_i Φ_i of some pixels, (p, 3)."""
         return self.image[pixels].astype(np.float64) - self.predicted[pixels]
 
     def noise(self, pixels: slice | Indices) -> Doubles:
-        """Return the half difference of the prediction at some pixels, (p, 3)."""
+        """Return the half difference of the prediction less Ψ at some pixels, (p, 3)."""
         half = self.half[pixels].astype(np.float64)
+        if self.unfiltered is not None:
+            half -= self.unfiltered[pixels]
         if self.current is None or self.share is None:
             return half
         return half - self.share[pixels] * self.current[pixels]
@@ -223,6 +231,9 @@ class PixelGradients:
                 own_look = None if look is None else band.steadied(*look, counted)
                 _fill_gradients(results[..., band.own], pixels, own_light, own_look)
         mean, half, bend, doubt = (x.T for x in results)
+        if residuals.unfiltered is not None:
+            weight = problem.squares.weight
+            half += weight.reshape(-1, weight.shape[2]) * residuals.unfiltered
         return cls(mean, half, bend, doubt)
 
 

@@ -113,10 +113,13 @@ class ReadingNoise:
 
     @classmethod
     def of(cls, solution: Solution) -> Self:
-        """Read the painting of an answer several times; a literal one has no such noise."""
+        """Read the painting of an answer several times; a literal one has no such noise, and a
+        render no wishes.
+        """
         problem, nothing = solution.problem, np.zeros_like(solution.weights)
         count = PAIRS if len(solution.weights) < MANY_LIGHTS else FEW_PAIRS
-        if not problem.fit.reads_wishes(is_sketch=are_sketches(problem.views)):
+        reads_wishes = problem.fit.reads_wishes(is_sketch=are_sketches(problem.views))
+        if not reads_wishes or problem.filter_share:
             return cls(nothing, nothing, nothing, count)
         views = problem.views
         blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
