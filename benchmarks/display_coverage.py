@@ -185,12 +185,17 @@ def painted(truth: Basis) -> Target:
     image = truth.mix(weights) * (0.75 + 0.45 * (x > 0.5))
     image = image * np.array([1.12, 0.95, 0.8]) ** np.where(y > 0.5, 1, -0.5)
     image += 0.03 * np.exp(-((x - 0.3) ** 2 + (y - 0.4) ** 2) / 0.02)
+    return in_eight_bits(image)
+
+
+def in_eight_bits(image: np.ndarray) -> Target:
+    """Return a picture of light, (h, w, 3), as a painting in a PNG that counts everywhere."""
     view = lp.ViewTransform("srgb")
-    codes = np.round(255 * view.encode(image))
+    codes = np.round(255 * np.clip(view.encode(image), 0, 1))
     return Target(
         "painted",
         view.decode(codes / 255).astype(np.float32),
-        np.ones(truth.size, np.float32),
+        np.ones(image.shape[:2], np.float32),
         everything=True,
         at_least=codes >= 255,
         transform=view,

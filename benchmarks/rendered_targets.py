@@ -7,6 +7,8 @@ the lights make exactly, but for its noise. Each seed renders basis and painting
 linear light. Printed is how often intervals hold the levels, on average and least, and how often
 they would without the noise of the painting. A painting that was rendered with another filter than
 a box is another picture: `--filter gaussian`, Mitsuba's default, shows what that does.
+`--eight-bits` makes a PNG of it, which is read as a sketch. The last column is the RMS error of the
+levels, relative to each.
 """
 
 import argparse
@@ -14,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from display_coverage import ROOMS, make_scene
+from display_coverage import ROOMS, in_eight_bits, make_scene
 
 import lightpaint as lp
 from lightpaint.scene.runtime.variant import use_variant
@@ -29,9 +31,10 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=256, help="samples of the basis")
     parser.add_argument("--target-spp", type=int, default=1024)
     parser.add_argument("--filter", choices=("box", "gaussian"), default="box")
+    parser.add_argument("--eight-bits", action="store_true", help="a PNG, read as a sketch")
     options = parser.parse_args()
     use_variant()
-    print(f"{'':12s}{'held':>8s}{'least':>8s}{'blind':>8s}")
+    print(f"{'':12s}{'held':>8s}{'least':>8s}{'blind':>8s}{'error':>8s}")
     with tempfile.TemporaryDirectory() as folder:
         for room in options.rooms:
             scene = make_scene(room, Path(folder), "40x24" if room in ROOMS else "1/8")
@@ -48,7 +51,7 @@ def measure(room: str, scene: lp.Scene, folder: Path, options: argparse.Namespac
     weights = lighting.weights_for(first)
     relit = lp.relight(scene, lighting, folder / f"{room}_relit.xml")
     loaded = mi.load_file(str(relit.path))
-    held, blind = [], []
+    held, blind, errors, is_on = [], [], [], weights > 0
     for seed in range(options.seeds):
         basis = lp.render_basis(scene, spp=options.spp, seed=seed + 1)
         side = relit.size[0] // basis.size[0]
@@ -61,15 +64,19 @@ def measure(room: str, scene: lp.Scene, folder: Path, options: argparse.Namespac
             image = np.array(mi.render(loaded, spp=spp, seed=seed))[..., :3]
         height, width = basis.size
         image = image.reshape(height, side, width, side, 3).mean(axis=(1, 3))
-        answer = lp.correct_noise(lp.solve(basis, lp.Target.of(image), literal=True))
+        target = in_eight_bits(image) if options.eight_bits else lp.Target.of(image)
+        answer = lp.correct_noise(lp.solve(basis, target, literal=not options.eight_bits))
+        errors.append(answer.weights[is_on] / weights[is_on] - 1)
         for kept, with_painting in ((held, True), (blind, False)):
             bars = lp.error_bars(answer, with_painting=with_painting)
             assert bars is not None
             low, high = bars.interval
             kept.append((low <= weights) & (weights <= high))
-    shares = np.mean(held, axis=0)[weights > 0]
-    without = np.mean(blind, axis=0)[weights > 0]
-    print(f"{room:12s}{shares.mean():8.3f}{shares.min():8.2f}{without.mean():8.3f}", flush=True)
+    shares = np.mean(held, axis=0)[is_on]
+    without = np.mean(blind, axis=0)[is_on].mean()
+    error = np.square(errors).mean() ** 0.5
+    line = f"{room:12s}{shares.mean():8.3f}{shares.min():8.2f}{without:8.3f}{error:8.3f}"
+    print(line, flush=True)
 
 
 if __name__ == "__main__":
