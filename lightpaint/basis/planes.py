@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, release_freed_memory
 from lightpaint.errors import BasisError
 from lightpaint.progress import counting, with_progress
 from lightpaint.threads import one_thread, parallel_map
@@ -198,6 +198,7 @@ class PlanesBase:
             mixed[:, block] = mix_channels(self.pixels(block), weights)
 
         parallel_map(fill, walked_blocks(self, pixels), unit="blocks")
+        _release_after_walk(self)
         return mixed
 
     @one_thread()
@@ -245,6 +246,9 @@ class PlanesBase:
                 where = as_slice(block, spare=spare)
                 light = _LightOf(self, where)
                 _add_products(gram, light, *squares(where, light.dense), rooms, advance)
+                del light
+        del rooms
+        _release_after_walk(self)
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
 
@@ -443,6 +447,12 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64
     return BLOCK_PIXELS // (2 if planes.count < LARGE_BLOCK_LIGHTS else 4), np.float32
+
+
+def _release_after_walk(planes: PlanesBase) -> None:
+    """Return the memory of a walk over many lights, which the C library keeps for each thread."""
+    if planes.count >= LARGE_BLOCK_LIGHTS:
+        release_freed_memory()
 
 
 def walked_blocks(planes: "Planes | PlanesBase", stop: int, start: int = 0) -> list[slice]:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from lightpaint.basis.file import basis_file, file_planes, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
+from lightpaint.basis.file.lit_strips import StripsInFile
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
@@ -184,6 +186,7 @@ def test_planes_of_a_file_are_those_in_memory(
     ids=["by rows", "whole", "sparse"],
 )
 @pytest.mark.parametrize("clean", [(), (2,), range(N)], ids=["none", "one", "all"])
+@pytest.mark.parametrize("kept", ["in memory", "in files", "full disk"])
 def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     tmp_path: Path,
     make_basis: Any,
@@ -192,7 +195,13 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     largest: int,
     sparse: int,
     room: int,
+    kept: str,
 ) -> None:
+    if kept != "in memory":
+        monkeypatch.setattr(lit_planes, "MAX_BYTES_IN_MEMORY", 0)
+        monkeypatch.setattr(lit_planes, "SPOOLED_BYTES", 2**15)  # of two lights
+    if kept == "full disk":
+        monkeypatch.setattr(file_planes.tempfile, "TemporaryFile", Mock(side_effect=OSError))
     # Bright lights have a scale; one is black, one reaches everything, and single channels are 0.
     rng, size = np.random.default_rng(8), (67, 90)
     images = rng.random((N, *size, 3), np.float32) * (rng.random((N, *size, 1)) < 0.1)
@@ -214,6 +223,7 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     reread = lp.read_basis(path)
     assert isinstance(reread.planes, LitPlanes)
     assert isinstance(reread.noise, LitPlanes)
+    assert isinstance(reread.planes._lit, StripsInFile) == (kept == "in files")
     assert reread.planes.is_noisy == (len(clean) < 2)
     check_alike(reread.planes, basis.images)
     check_alike(reread.noise, basis.half_differences)

@@ -213,7 +213,9 @@ class WholePlanes:
         self._size, self._places = size, dict[int, int]()
         self._array: Floats | TemporaryArray
         shape = count, 3, size
-        self._array = np.empty(shape, np.float32) if in_memory else TemporaryArray(shape)
+        self._array = (
+            np.empty(shape, np.float32) if in_memory or not count else TemporaryArray(shape)
+        )
         for place, (i, plane) in enumerate(planes):
             self._places[i] = place
             if isinstance(self._array, TemporaryArray):

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, release_freed_memory
 from lightpaint.basis import Basis, MemoryPlanes, walked_blocks
 from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
 from lightpaint.lighting.loss.pixel_loss import Loss, PixelLoss, Squares, image_in_place
@@ -255,6 +255,8 @@ def run_rounds(
         is_kept = keeps_matrix and is_near and not (pixels.has_pieces or is_last_curved)
         matrix = round_.equations if is_kept else None
         del round_  # else its pictures would coexist with the next ones
+        if keeps_matrix:
+            release_freed_memory()
 
 
 @dataclass(frozen=True)
