@@ -83,8 +83,8 @@ WATCH = """() => {
   const { screen, mirror } = engine;
   const times = [], send = host.send.bind(host), draw = screen.drawNow.bind(screen);
   let moved = 0, answered = 0, mixing = 0;
-  for (const kind of ['pointermove', 'pointerdown'])
-    addEventListener(kind, (event) => { moved = event.timeStamp; }, true);
+  for (const kind of ['pointerrawupdate', 'pointermove', 'pointerdown'])
+    addEventListener(kind, (event) => { moved = Math.max(moved, event.timeStamp); }, true);
   host.send = async (kind, fields, arrays) => {
     const at = kind === 'mix' ? mixing : moved;
     const reply = await send(kind, fields, arrays);

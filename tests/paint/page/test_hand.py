@@ -20,6 +20,37 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(new_painter: Any) ->
     assert painter.page.get_by_text("Close to what was painted").is_visible()
 
 
+#: Moves the pointer, pressed, as browsers say before the next frame, and lets the stroke be sent.
+MOVE_EARLY = """([clientX, clientY]) => {
+  const event = { clientX, clientY, pointerId: 1, bubbles: true };
+  engine.element.dispatchEvent(new PointerEvent('pointerrawupdate', event));
+  engine.tell('send', {});
+}"""
+
+
+def test_a_stroke_follows_the_hand_between_frames(painter: Painter) -> None:
+    """As soon as it is sent, and once."""
+    (x, y), mouse = painter.place(), painter.page.mouse
+
+    def moves() -> int:
+        return len(painter.calls("move"))
+
+    painter.page.evaluate(MOVE_EARLY, [x + 5, y])
+    assert moves() == 0  # no stroke has begun
+    mouse.move(x, y)
+    mouse.down()
+    begun = moves()
+    painter.page.evaluate(MOVE_EARLY, [x + 20, y])
+    assert moves() == begun + 1
+    painter.page.evaluate("() => engine.tell('send', {})")
+    assert moves() == begun + 1
+    painter.page.evaluate(MOVE_EARLY.replace("engine.tell('send', {});", ""), [x + 40, y])
+    mouse.up()
+    painter.still()
+    assert moves() == begun + 2
+    assert painter.calls("end")
+
+
 @pytest.mark.nightly
 def test_keys_of_paint_programs(painter: Painter) -> None:
     press = painter.page.keyboard.press

@@ -61,6 +61,24 @@ def test_one_message_is_in_flight_and_the_rest_is_merged(host_messages: Any):
     assert messages[2]["label"] == "brush"
 
 
+def test_a_message_has_what_was_done_until_it_is_sent(host_messages: Any):
+    """As what the pointer did since the last frame."""
+    messages, flights = host_messages(
+        """
+        const early = [[3, 4, 3, 4], [5, 7, 5, 8]];
+        strokes.onBeforeSend = () => early.length && strokes.touch(early.shift());
+        strokes.begin();
+        strokes.touch([0, 2, 0, 3]);
+        await host.answer();
+        const flights = [host.inFlight];
+        await host.answer();
+        return [host.told, [...flights, host.inFlight]];
+        """
+    )
+    assert flights == [1, 0]
+    assert [message["region"] for message in messages] == [[0, 4, 0, 4], [5, 7, 5, 8]]
+
+
 def test_a_stroke_that_is_sent_already_still_ends(host_messages: Any):
     messages = host_messages(
         """

@@ -49,7 +49,8 @@ export function openEngine(host, options = {}) {
 
 /** What draws and paints for the interface. It emits "message": an answer to a stroke; "frame": before it
  * draws; "probed": when the light under the pointer has come; "loading": {done, total, isFirst} pictures,
- * where some of the lights have none yet; "adjustment": {stops, mired} of a drag; "layers": {} when
+ * where some of the lights have none yet; "adjustment": {stops, mired} of a drag; "send": {} before
+ * the stroke in progress is sent, so that it may be moved on; "layers": {} when
  * `layerState` has changed; "selection": {} when another part is selected; "view": {view} in which
  * something was undone; "lost": {count, isStale} strokes that are not sent any more, since another page has
  * painted meanwhile, or the session is there no more; "trouble": {text}. */

@@ -135,6 +135,7 @@ export class SessionMirror extends PictureState {
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
       this.strokes.onSettled = () => this.layers.adopt(false);
       this.strokes.draftStep = () => this.draftStep;
+      this.strokes.onBeforeSend = () => this.emit('send', {});
     }
     this.strokes.paintOn(this.canvas, view);
     this.layers.open(this.canvas, view);

@@ -30,6 +30,9 @@ export class StrokeSender {
    * @type {() => number | null} */
   draftStep = () => null;
 
+  /** Called before changes of the stroke in progress are sent; may bring further ones. */
+  onBeforeSend = () => {};
+
   /** @param {import("./socket_host.js").Host} host
    * @param {() => void} [onRefusal] hears that the session has not taken a stroke
    * @param {(count: number, isStale: boolean) => void} [onLoss] hears how many strokes are not sent
@@ -47,6 +50,7 @@ export class StrokeSender {
     /** @type {PendingStroke[]} */
     this.pendingStrokes = [];
     this.isBusy = false;
+    this.isCollecting = false;
     /** Whether a slider of a layer moves. */
     this.isSliding = false;
     /** @type {ChangeLayers} */
@@ -241,6 +245,12 @@ export class StrokeSender {
   /** Send the next message, unless one is pending. */
   pump() {
     if (this.isBusy || !this.isOpen || this.isOver) return;
+    if (this.currentStroke && !this.isCollecting) {
+      this.isCollecting = true;
+      this.onBeforeSend();
+      this.isCollecting = false;
+      if (this.isBusy) return; // these have been sent already
+    }
     const [next] = this.pendingStrokes;
     if (next && 'isDropped' in next) this.send('drop_stroke', { stroke: next.stroke }, {}, next);
     else if (next && 'change' in next) {

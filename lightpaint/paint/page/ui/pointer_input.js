@@ -36,6 +36,11 @@ export class Pointer {
     /** Start of a gradient that is drawn by key. @type {Point | null} */
     this.gradientStart = null;
     this.isSpaceDown = false;
+    /** What the hand has done since the last `move`, where the browser tells it before the next
+     * frame. @type {PointerEvent[]} */
+    this.earlyEvents = [];
+    this.hasEarlyEvents = false;
+    engine.on('send', () => this.follow());
     /** Whether a drag adjusts light: its label stays at the place that it started from. */
     this.isAdjusting = false;
   }
@@ -103,6 +108,8 @@ export class Pointer {
       return;
     }
     this.gesture = 'stroke';
+    this.hasEarlyEvents = false;
+    this.earlyEvents = [];
     this.startTime = event.timeStamp;
     this.pathLength = 0;
     this.engine.begin(point);
@@ -122,20 +129,39 @@ export class Pointer {
     if (this.gesture === 'pan' && previous) {
       this.pan(place.x - previous.x, place.y - previous.y);
     } else if ((this.gesture === 'stroke' || this.gesture === 'select') && previous) {
-      const events = event.getCoalescedEvents?.() ?? [];
-      const points = (events.length ? events : [event]).map((sample) => this.point(sample));
-      const validPoints = /** @type {Point[]} */ (points.filter(Boolean));
-      if (this.gesture === 'select') return this.selecting.move(validPoints, event);
+      if (this.gesture === 'select') return this.selecting.move(this.points(samplesOf(event)), event);
       this.pathLength += Math.hypot(place.x - previous.x, place.y - previous.y);
-      if (validPoints.length) this.lastPoint = validPoints[validPoints.length - 1];
-      this.engine.move(validPoints);
+      if (!this.hasEarlyEvents) this.earlyEvents = samplesOf(event);
+      this.follow();
     }
+  }
+
+  /** Note a movement of the hand before the frame in which `move` hears of it: a message to the
+   * session that leaves in between should have it. @param {PointerEvent} event */
+  moveEarly(event) {
+    if (this.gesture !== 'stroke' || !this.fingers.has(event.pointerId)) return;
+    this.hasEarlyEvents = true;
+    this.earlyEvents.push(...samplesOf(event));
+  }
+
+  /** Move the stroke to where the hand is. */
+  follow() {
+    const points = this.points(this.earlyEvents.splice(0));
+    if (!points.length) return;
+    this.lastPoint = points[points.length - 1];
+    this.engine.move(points);
+  }
+
+  /** @param {PointerEvent[]} events @returns {Point[]} in the pane in which the stroke began */
+  points(events) {
+    return /** @type {Point[]} */ (events.map((event) => this.point(event)).filter(Boolean));
   }
 
   /** @param {PointerEvent} event */
   up(event) {
     this.spread();
     this.fingers.delete(event.pointerId);
+    if (this.gesture === 'stroke' && event.type !== 'pointercancel') this.follow();
     if (this.gesture === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
     else if (this.gesture === 'stroke') this.engine.end();
     if (this.gesture === 'select' && event.type === 'pointercancel') this.selecting.cancel();
@@ -285,6 +311,12 @@ export function paneAt(engine, x, y) {
         (pane) => x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height,
       ) ?? null
   );
+}
+
+/** @param {PointerEvent} event @returns {PointerEvent[]} what has been made one event */
+function samplesOf(event) {
+  const events = event.getCoalescedEvents?.() ?? [];
+  return events.length ? events : [event];
 }
 
 /** @param {PointerEvent} event */

@@ -33,6 +33,8 @@ export function useStageInput(frame, pointer, app) {
       if (element.dataset.by === 'keys') delete element.dataset.by;
       pointer.move(event);
     });
+    // On pages from this machine, or over HTTPS, in browsers that have it.
+    listen('pointerrawupdate', (event) => pointer.moveEarly(event));
     listen('pointerup', (event) => pointer.up(event));
     listen('pointercancel', (event) => pointer.up(event));
     listen('wheel', (event) => pointer.wheel(event));
