@@ -81,19 +81,23 @@ def denoise_mixes(
     weights: Sequence[Doubles],
     *,
     mixed: Sequence[Floats] | None = None,
-    factor: int = 1,
+    factor: int | Sequence[int] = 1,
     quality: MixQuality = "fast",
 ) -> list[Floats]:
     """Return several mixes denoised, in one walk over each set of planes.
 
-    weights: (n, 3) each. For the others see `denoise_mix`.
+    weights: (n, 3) each. mixed: the sums of the first ones. factor: of all mixes, or of each. For
+    the others see `denoise_mix`.
     """
-    together = np.array(weights)
-    sets = [basis.mixes(together) if mixed is None else mixed]
+    together, known = np.array(weights), list(mixed or ())
+    rest = together[len(known) :]
+    sets = [[*known, *(basis.mixes(rest) if len(rest) else ())]]
     if (parts := basis.indirect) is not None:
-        sets += [x.mixes(together) for x in (basis.noise, parts.planes, parts.noise)]
+        sets += [list(x.mixes(together)) for x in (basis.noise, parts.planes, parts.noise)]
+    factors = [factor] * len(weights) if isinstance(factor, int) else factor
     return [
-        _denoise_pictures(basis, pictures, factor, quality) for pictures in zip(*sets, strict=True)
+        _denoise_pictures(basis, pictures, side, quality)
+        for side, pictures in zip(factors, zip(*sets, strict=True), strict=True)
     ]
 
 

@@ -226,7 +226,13 @@ def write_report(
     weights, predicted = look.solution.weights, look.predicted.image
     factor = report.look_reduction(look.basis.size)
     looks = report.CleanLooks.clean(
-        look.basis, weights, predicted, verified, larger=larger_features, factor=factor
+        look.basis,
+        weights,
+        predicted,
+        verified,
+        larger=larger_features,
+        factor=factor,
+        others=report.mixes_of_mixer(look.basis, look.lighting),
     )
     transform = report.report_transform(look.target, look.basis, predicted)
     missed = report.residual_of(look.solution, predicted, transform=transform)

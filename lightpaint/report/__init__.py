@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from lightpaint.report.page.html import html
     from lightpaint.report.page.limit_sections import closer_choice
     from lightpaint.report.page.mixer import (
-        kelvin_colors, light_data, lighting_data, mixer_assets, mixer_html, packed_gels,
-        planes_for_page, transform_data,
+        kelvin_colors, light_data, lighting_data, mixer_assets, mixer_html,
+        mixes_of_mixer, packed_gels, planes_for_page, transform_data,
     )
     from lightpaint.report.page.placement_section import (
         spoken_position, spoken_suggestions, spoken_turn,

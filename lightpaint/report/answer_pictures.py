@@ -9,7 +9,7 @@ pixels of the film, so has the picture.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -313,6 +313,16 @@ class Encoder(ViewTransform):
         return self.encoded[id(image)][1]
 
 
+@dataclass(frozen=True)
+class MixesOfBlocks:
+    """Mixes of lights whose pictures are reduced. weights: (n, 3) each. factor: side of the blocks
+    of pixels that become one.
+    """
+
+    weights: Sequence[Doubles]
+    factor: int
+
+
 def _verified_factor(verified: Floats, basis: Basis, factor: int) -> int:
     """Return the side of the blocks of a verification, which has as many pixels as the other looks
     or, where these are few, more. factor: side of the blocks of the other looks.
@@ -326,14 +336,15 @@ def _verified_factor(verified: Floats, basis: Basis, factor: int) -> int:
 class CleanLooks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
-    verified: None without one. texts: texts for a PNG of them; none for raw renders. encoders:
-    by transform.
+    verified: None without one. texts: texts for a PNG of them; none for raw renders. others: of
+    the mixes that were denoised in the same walk; none without. encoders: by transform.
     """
 
     current: Floats
     predicted: Floats
     verified: Floats | None
     texts: dict[str, str]
+    others: tuple[Floats, ...] = ()
     encoders: dict[ViewTransform, Encoder] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
@@ -346,12 +357,14 @@ class CleanLooks:
         *,
         larger: images.Features | None = None,
         factor: int = 1,
+        others: MixesOfBlocks | None = None,
     ) -> "CleanLooks":
         """Make the looks without their grain.
 
         weights: (n, 3), of which `predicted` is the sum. larger: of a verification that has another
         size than the basis. factor: side of the blocks of pixels that become one; the looks of a
-        page are denoised coarsely.
+        page are denoised coarsely. others: mixes that are to be denoised in the same walk over the
+        planes.
         """
         features = basis.features
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
@@ -364,9 +377,15 @@ class CleanLooks:
             )
         planes = cached_clean_planes(basis)
         if planes is None and basis.former is None:
-            both, looks = [basis.current_weights, weights], [basis.current_look, predicted]
-            now, answer = denoise_mixes(basis, both, mixed=looks, factor=factor, quality="coarse")
-            return cls(now, answer, verified, texts)
+            others = others or MixesOfBlocks((), 1)
+            now, answer, *rest = denoise_mixes(
+                basis,
+                [basis.current_weights, weights, *others.weights],
+                mixed=[basis.current_look, predicted],
+                factor=[factor, factor, *(others.factor for _ in others.weights)],
+                quality="coarse",
+            )
+            return cls(now, answer, verified, texts, tuple(rest))
         size = images.blocks_in(basis.size, factor)
         known = None if planes is None or basis.former is not None else planes.look(size)
         now = (

@@ -22,6 +22,7 @@ from lightpaint.basis.file.half_floats import (
     EncodedPlanes,
     PlaneEncoding,
     encode_pair,
+    encoded_plane,
 )
 from lightpaint.basis.planes import IndirectLight, MemoryPlanes, as_planes
 from lightpaint.errors import BasisError
@@ -362,3 +363,13 @@ def test_writing_holds_one_light_at_a_time(tmp_path: Path, make_basis: Any) -> N
     reread = read_basis(tmp_path / "a.basis.exr")
     np.testing.assert_allclose(reread.planes.plane(7), planes.plane(7), rtol=2**-11)
     assert as_planes(reread.planes).count == planes.count
+
+
+def test_planes_that_are_not_finite_are_decoded_as_numpy_does() -> None:
+    """That they are is looked for once, and long planes are decoded from their bits."""
+    numbers = np.random.default_rng(2).normal(size=(2, 3, 64, 80)).astype(np.float16)
+    numbers[0, 1, 5, 7], numbers[0, 2, 9, 3] = np.inf, np.nan
+    planes = EncodedPlanes([encoded_plane(x, 1.0) for x in numbers], is_decoded_once=False)
+    for k, expected in enumerate(numbers.astype(np.float32)):
+        np.testing.assert_array_equal(planes.plane(k).transpose(2, 0, 1), expected)
+        np.testing.assert_array_equal(planes.lit_plane(k)[1].reshape(expected.shape), expected)

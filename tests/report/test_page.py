@@ -29,6 +29,7 @@ from lightpaint.report.measures import (
 )
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.lights_table import hex_color
+from lightpaint.report.page.mixer import mixer_html, mixes_of_mixer
 from lightpaint.report.page.report_page import report_page
 from lightpaint.target.painted_target import Target
 
@@ -187,6 +188,22 @@ def test_pictures_of_a_wide_film_are_no_larger_than_shown(make_basis: Any):
             looks=looks,
         )
         assert 3 * 650 < sheet.shape[1] < 3 * 650 + 5 * 54
+
+
+def test_lights_that_share_a_row_are_denoised_with_the_looks(make_basis: Any):
+    """In the same walk over the planes, to the same bits as alone."""
+    basis = make_basis(16, (20, 30))
+    rng = np.random.default_rng(3)
+    weights = rng.uniform(0.5, 2, (16, 3))
+    lighting = Lighting.current(basis)
+    mixes = mixes_of_mixer(basis, lighting)
+    assert len(mixes.weights) == 2
+    looks = CleanLooks.clean(basis, weights, basis.mix(weights), None, others=mixes)
+    assert len(looks.others) == 2
+    alone = CleanLooks.clean(basis, weights, basis.mix(weights), None)
+    np.testing.assert_array_equal(looks.predicted, alone.predicted)
+    made = mixer_html(basis, lighting, is_clean=True, denoised_mixes=looks.others)
+    assert made == mixer_html(basis, lighting, is_clean=True)
 
 
 def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):

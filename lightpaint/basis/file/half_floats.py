@@ -10,7 +10,7 @@ a power of two.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from threading import Lock
 from typing import Any
 
@@ -23,6 +23,7 @@ from lightpaint.arrays import (
     Floats,
     Indices,
     copy_as_singles,
+    is_finite,
     read_only,
     release_freed_memory,
     round_to_halves,
@@ -85,6 +86,11 @@ class EncodedPlane:
     def scale(self) -> float:
         """The power of two that multiplies stored numbers."""
         return self.encoding.scale
+
+    @cached_property
+    def is_finite(self) -> bool:
+        """True if it has neither infinities nor NaN: looked for once, not at each decoding."""
+        return all(is_finite(channel) for channel in self.numbers)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -151,17 +157,19 @@ class EncodedPlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        if self._singles is not None:
-            return np.ascontiguousarray(self._singles[i].T).reshape(*self.size, 3)
-        image = np.empty((*self.size, 3), np.float32)
-        self._decode(i, slice(None), image.reshape(-1, 3).T)
-        return image
+        return np.ascontiguousarray(self._channels(i).T).reshape(*self.size, 3)
 
     def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
-        if self._singles is None:
-            return super().lit_plane(i)
-        return slice(None), self._singles[i]
+        return slice(None), self._channels(i)
+
+    def _channels(self, i: int) -> npt.NDArray[np.float32]:
+        """Return the plane of light i decoded, (3, pixels)."""
+        if self._singles is not None:
+            return np.asarray(self._singles[i])
+        channels = np.empty((3, self.size[0] * self.size[1]), np.float32)
+        self._decode(i, slice(None), channels)
+        return channels
 
     @property
     def _singles(self) -> npt.NDArray[np.float32] | None:
@@ -207,7 +215,7 @@ class EncodedPlanes(RowPlanes):
         """Decode some pixels of light i into an array (3, p)."""
         encoded = self._stored[i]
         for stored, channel in zip(encoded.numbers, into, strict=True):
-            copy_as_singles(stored.reshape(-1)[where], channel)
+            copy_as_singles(stored.reshape(-1)[where], channel, are_finite=encoded.is_finite)
         if encoded.encoding.scale != 1:
             into *= np.float32(encoded.encoding.scale)
 

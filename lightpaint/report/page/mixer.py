@@ -39,6 +39,7 @@ from lightpaint.images import (
 )
 from lightpaint.lighting import ALL_REACHED, Lighting, lighting_fields
 from lightpaint.progress import with_progress
+from lightpaint.report.answer_pictures import MixesOfBlocks
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
@@ -118,6 +119,7 @@ def mixer_html(
     is_clean: bool = False,
     scene: str | None = None,
     max_pixels: int = MAX_PIXELS,
+    denoised_mixes: Sequence[Floats] = (),
 ) -> Markup:
     """Return a section of HTML; a page with mixers needs `mixer_assets` after the last.
 
@@ -129,10 +131,11 @@ def mixer_html(
         is_clean: Whether to denoise planes.
         scene: For the command line; None without a scene to relight.
         max_pixels: Maximum number of pixels in all planes.
+        denoised_mixes: Pictures of `mixes_of_mixer`, if they are denoised already.
     """
     shown, joint = rows_of_mixer(basis, lighting)
     options: PlaneOptions = {"is_clean": is_clean, "max_pixels": max_pixels}
-    size, planes = _shown_planes(basis, lighting, shown, joint, **options)
+    size, planes = _shown_planes(basis, lighting, shown, joint, denoised_mixes, **options)
     transform = transform or colour.ViewTransform()
     data = {
         "size": size,
@@ -164,13 +167,30 @@ def _shown_planes(
     lighting: Lighting,
     shown: Indices,
     joint: Sequence[JointLights],
+    denoised_mixes: Sequence[Floats],
     **options: Unpack[PlaneOptions],
 ) -> tuple[list[int], list[dict[str, Any]]]:
     """Return size and planes of each light; then of joint ones, in the answer and in the scene."""
     if not joint:
         return planes_for_page(basis, **options)
-    mixes = [mix for lights in joint for mix in lights.mixes(lighting, basis)]
-    return _compact_planes(basis, shown, mixes, **options)
+    mixes = _joint_mixes(basis, lighting, joint)
+    return _compact_planes(basis, shown, mixes, denoised_mixes, **options)
+
+
+def _joint_mixes(
+    basis: Basis, lighting: Lighting, joint: Sequence[JointLights]
+) -> Sequence[Doubles]:
+    return [mix for lights in joint for mix in lights.mixes(lighting, basis)]
+
+
+def mixes_of_mixer(basis: Basis, lighting: Lighting) -> MixesOfBlocks:
+    """Return the mixes of lights that share a row, in the answer and in the scene, as far as
+    `mixer_html` denoises them.
+    """
+    shown, joint = rows_of_mixer(basis, lighting)
+    mixes = _joint_mixes(basis, lighting, joint)
+    factor = page_reduction(basis, len(shown) + len(mixes))
+    return MixesOfBlocks(mixes if factor < CLEAN_REDUCTION else (), factor)
 
 
 def planes_for_page(
@@ -184,14 +204,25 @@ def planes_for_page(
     return make_once(
         basis.planes,
         ("mixer", is_clean, max_pixels),
-        lambda: _compact_planes(basis, all_lights, [], is_clean=is_clean, max_pixels=max_pixels),
+        lambda: _compact_planes(
+            basis, all_lights, [], [], is_clean=is_clean, max_pixels=max_pixels
+        ),
     )
 
 
 def _compact_planes(
-    basis: Basis, lights: Indices, mixes: Sequence[Doubles], *, is_clean: bool, max_pixels: int
+    basis: Basis,
+    lights: Indices,
+    mixes: Sequence[Doubles],
+    denoised_mixes: Sequence[Floats],
+    *,
+    is_clean: bool,
+    max_pixels: int,
 ) -> tuple[list[int], list[dict[str, Any]]]:
-    """Return planes of some lights and mixes of others, (n, 3) each, compact for the page."""
+    """Return planes of some lights and mixes of others, (n, 3) each, compact for the page.
+
+    denoised_mixes: the pictures of the mixes if they have to be denoised, and already are.
+    """
     planes = cached_clean_planes(basis) if is_clean else None
     count = len(lights) + len(mixes)
     factor = page_reduction(basis, count, max_pixels=max_pixels)
@@ -210,7 +241,9 @@ def _compact_planes(
             denoise_plane(basis, k, factor=factor, quality="coarse")
             for k in with_progress(lights.tolist(), "planes")
         ]
-        if mixes:
+        if denoised_mixes:
+            pictures += denoised_mixes
+        elif mixes:
             pictures += denoise_mixes(basis, mixes, factor=factor, quality="coarse")
     else:
         pictures = in_turns(plane, range(len(lights)), basis.size, unit="planes")

@@ -217,6 +217,7 @@ def _mixer(
         answer_pictures.target_picture(answer.target, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
+        denoised_mixes=looks.others,
         scene=shlex.quote(_absolute_path(scene)) if scene.endswith(".xml") else None,
     )
 

@@ -44,6 +44,9 @@ POWER = 36.0
 #: Pixels along the sides of blocks, and blocks on either side, over which products are averaged.
 BLOCK, BLOCKS_AROUND = 8, 2
 
+#: Rows of a band that is worked on at a time, whole blocks.
+BAND_ROWS = 8 * BLOCK
+
 #: Largest ⟨a²⟩ / ⟨|a|⟩² of noise: π/2 if it is normal, more with fireflies. A painted lamp of a few
 #: pixels, alone on dark ground, is far beyond.
 MAX_PEAK = 12.0
@@ -137,20 +140,45 @@ def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
     """Return the variance that N measures with taps `step` pixels apart, (h, w)."""
     if min(counted.shape) <= 2 * step:
         return np.zeros(counted.shape)
-    a, whole = second_difference(residual, counted, step)
+    height, width = (side - 2 * step for side in counted.shape)
+    bands = range(0, height, BAND_ROWS)
+    of_bands = [_tap_sums(residual, counted, step, slice(k, k + BAND_ROWS)) for k in bands]
+    whole, products, sizes = (
+        np.asarray(box_mean(np.concatenate(x), BLOCKS_AROUND), np.float64)
+        for x in zip(*of_bands, strict=True)
+    )
+    share = np.maximum(whole, 1e-12)
+    power, size = products / share, sizes / share
+    variance = np.clip(power, 0, MAX_PEAK * np.square(size)) / POWER
+    variance = enlarged(variance, BLOCK)[:height, :width]
+    # The border gets the values beside it.
+    return np.pad(variance, step, mode="edge")
+
+
+def _tap_sums(
+    residual: Floats, counted: Bools, step: int, rows: slice
+) -> tuple[Doubles, Doubles, Doubles]:
+    """Return sums over blocks of a band of a, (h', w') each: of where all taps count, of a² less
+    the products at a distance, and of |a|.
+
+    rows: of a, whose products reach beyond the band. A band fits into a processor's cache.
+    """
+    reach, height = 3 * step, len(counted) - 2 * step
+    first, end = max(rows.start - reach, 0), min(rows.stop + reach, height)
+    taps = slice(first, end + 2 * step)
+    a, whole = second_difference(residual[taps], counted[taps], step)
     products = np.square(a)
-    for window, shifted in distant_windows(3 * step):
+    for window, shifted in distant_windows(reach):
         pairs = a[window] * a[shifted]
         pairs /= 2
         products[window] -= pairs
         products[shifted] -= pairs
-    share = np.maximum(_neighbourhood_means(whole.astype(np.float64)), 1e-12)
-    power = _neighbourhood_means(products) / share
-    size = _neighbourhood_means(np.abs(a, out=products)) / share
-    variance = np.clip(power, 0, MAX_PEAK * np.square(size)) / POWER
-    variance = enlarged(variance, BLOCK)[: a.shape[0], : a.shape[1]]
-    # The border gets the values beside it.
-    return np.pad(variance, step, mode="edge")
+    own = slice(rows.start - first, min(rows.stop, height) - first)
+    return (
+        _block_sums(whole[own].astype(np.float64)),
+        _block_sums(products[own]),
+        _block_sums(np.abs(a[own])),
+    )
 
 
 def second_difference(residual: Floats, counted: Bools, step: int) -> tuple[Doubles, Bools]:
@@ -185,11 +213,10 @@ def distant_windows(distance: int) -> Iterator[tuple[tuple[slice, slice], tuple[
     yield (first, last), (last, first)
 
 
-def _neighbourhood_means(image: Doubles) -> Doubles:
-    """Return the mean over each block and those around it; the last block may be cut."""
+def _block_sums(image: Doubles) -> Doubles:
+    """Return the sum over each block; the last ones may be cut."""
     rows, columns = (np.arange(0, length, BLOCK) for length in image.shape)
-    sums = np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)
-    return np.asarray(box_mean(sums, BLOCKS_AROUND), np.float64)
+    return np.asarray(np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1))
 
 
 @dataclass(frozen=True)
