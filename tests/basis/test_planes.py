@@ -363,6 +363,26 @@ def test_means_of_lit_pixels_are_those_of_all_pixels(
         np.testing.assert_allclose(means.rows(1, 2), expected[:, 1:2], rtol=1e-6)
 
 
+def test_mixes_of_lit_pixels_are_those_of_one_after_the_other() -> None:
+    """To the bit, and to round-off those of all pixels; one light is kept whole, and one scaled."""
+    rng = np.random.default_rng(12)
+    images = rng.random((5, *SIZE, 3), np.float32) * (rng.random((5, *SIZE, 1)) < 0.4)
+    images = images.astype(np.float16).astype(np.float32)
+    stored = [LitPlane.of(np.moveaxis(x.astype(np.float16), -1, 0), 1.0) for x in images]
+    stored[1] = replace(stored[1], scale=4.0)
+    stored[2] = LitPlane.of(np.moveaxis(images[2], -1, 0), 1.0)
+    images[1] *= 4
+    lit, weights = LitPlanes(stored, SIZE), rng.normal(size=(3, 5, 3))
+    together = lit.mixes(weights)
+    np.testing.assert_array_equal(together, np.concatenate([lit.mixes(x[None]) for x in weights]))
+    expected = MemoryPlanes(images).mixes(weights)
+    np.testing.assert_allclose(together, expected, rtol=1e-5, atol=1e-6)
+    exact = lit.exact_mix(weights[0])
+    np.testing.assert_array_equal(
+        exact.T.astype(np.float32).reshape(together[0].shape), together[0]
+    )
+
+
 def test_work_on_lit_pixels_is_stopped_between_strips(images: np.ndarray) -> None:
     """As where a painter ends while it reads a thousand lights."""
 

@@ -267,8 +267,12 @@ class LitPlanes(RowPlanes):
 
     def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
-        mixed = np.stack([self.exact_mix(one).T for one in weights]).astype(np.float32)
-        return mixed.reshape(len(weights), *self._size, 3)
+        if len(weights) == 1:  # which may be known
+            mixed = self.exact_mix(weights[0])[None]
+        else:
+            mixed = self._exact_mixes(np.asarray(weights))
+        images = mixed.transpose(0, 2, 1).astype(np.float32, order="C")
+        return images.reshape(len(weights), *self._size, 3)
 
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
@@ -321,15 +325,16 @@ class LitPlanes(RowPlanes):
 
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only."""
-        return self._mixes.get(weights, self._mix)
+        return self._mixes.get(weights, lambda one: self._exact_mixes(np.array([one]))[0])
 
-    def _mix(self, weights: Doubles) -> Doubles:
+    def _exact_mixes(self, weights: Doubles) -> Doubles:
+        """Return several exact mixes, (k, 3, p), in one walk. weights: (k, n, 3)."""
         scaled = weights * self._scales[:, None]
         numbers = range(len(self._begins))
-        strips = parallel_map(lambda k: self._lit.strip(k).mix(scaled), numbers, unit="strips")
-        mixed = np.concatenate(strips, axis=1)
+        strips = parallel_map(lambda k: self._lit.strip(k).mixes(scaled), numbers, unit="strips")
+        mixed = np.concatenate(strips, axis=2)
         for i in self._clean:
-            mixed += scaled[i][:, None] * self._clean.pixels(i)
+            mixed += scaled[:, i, :, None] * self._clean.pixels(i)
         return np.asarray(mixed)
 
 

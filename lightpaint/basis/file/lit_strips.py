@@ -109,16 +109,19 @@ class LitStrip:
         ]
         return np.reshape(sums, (3, n, count))
 
-    def mix(self, weights: Doubles) -> Doubles:
-        """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
+    def mixes(self, weights: Doubles) -> Doubles:
+        """Return sums Σ w_i of the planes, (k, 3, pixels) float64. weights: (k, n, 3), with the
+        scales.
+        """
         from scipy.sparse import csc_array
 
         lit, begins = self.lit.astype(np.int32), self.begins.astype(np.int32)
-        shape = self.size, len(weights)
-        channels = (as_singles(channel).astype(np.float64) for channel in self.numbers)
-        return np.stack(
-            [csc_array((x, lit, begins), shape) @ weights[:, c] for c, x in enumerate(channels)]
-        )
+        shape, mixed = (self.size, weights.shape[1]), np.empty((len(weights), 3, self.size))
+        for c, channel in enumerate(self.numbers):
+            light = csc_array((as_singles(channel).astype(np.float64), lit, begins), shape)
+            for into, one in zip(mixed, weights, strict=True):
+                into[c] = light @ one[:, c]
+        return mixed
 
 
 class StripsInMemory:
