@@ -325,10 +325,10 @@ class MixesOfBlocks:
 
 def _verified_factor(verified: Floats, basis: Basis, factor: int) -> int:
     """Return the side of the blocks of a verification, which has as many pixels as the other looks
-    or, where these are few, more. factor: side of the blocks of the other looks.
+    or, where there is room for more, a multiple. factor: side of the blocks of the other looks.
     """
     side = factor * (images.whole_factor(verified.shape[:2], basis.size) or 1)
-    least = look_reduction(verified.shape[:2]) if factor > 1 else 1
+    least = min(look_reduction(verified.shape[:2]), side)
     return next(x for x in range(least, side + 1) if side % x == 0)
 
 

@@ -20,6 +20,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.answer_pictures import CleanLooks
+from lightpaint.report.basis_memo import look_reduction
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.measures import (
     ReportedAnswer,
@@ -188,6 +189,18 @@ def test_pictures_of_a_wide_film_are_no_larger_than_shown(make_basis: Any):
             looks=looks,
         )
         assert 3 * 650 < sheet.shape[1] < 3 * 650 + 5 * 54
+
+
+def test_a_verification_is_reduced_by_whole_blocks_to_what_is_shown(make_basis: Any):
+    """It has the size of the other looks, or a multiple of it where there is room."""
+    for width, whole, expected in ((1300, 2600, 650), (640, 1280, 1280), (640, 1920, 640)):
+        basis = make_basis(2, (24, width))
+        times = whole // width
+        verified = np.ones((24 * times, whole, 3), np.float32)
+        factor = look_reduction(basis.size)
+        looks = CleanLooks.raw(basis, basis.current_look, verified, factor=factor)
+        assert looks.verified is not None
+        assert looks.verified.shape == (24 * times * expected // whole, expected, 3)
 
 
 def test_lights_that_share_a_row_are_denoised_with_the_looks(make_basis: Any):
