@@ -50,29 +50,42 @@ def usd_multipliers(
     Raises OutputError if the library is not installed, or cannot read the stage.
     """
     usd.check_usd()
-    from pxr import Sdf, Usd
+    from pxr import Sdf
 
     opened_stage = usd.open_stage(stage)
-    lights = [prim for prim in opened_stage.Traverse() if _is_light(prim)]
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.comment = about
-    layer_stage = Usd.Stage.Open(layer)
-    left = []
+    # The layer's own stage is closed before it has sublayers, for which it would look.
+    left = _write_multiples(layer, opened_stage, multipliers, by_frame or {}, primaries)
+    layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
+    usd.like_stage(layer, stage)
+    spaces = usd.unknown_spaces(opened_stage)
+    return usd.Overrides(layer.ExportToString(), left, unknown_spaces=spaces)
+
+
+def _write_multiples(
+    layer: Any,
+    opened_stage: Any,
+    multipliers: Mapping[str, RGB],
+    by_frame: Mapping[int, Mapping[str, RGB]],
+    primaries: tuple[float, ...],
+) -> tuple[str, ...]:
+    """Write multiples of a stage's lights into the layer; return the groups that it lacks."""
+    from pxr import Usd
+
+    layer_stage, left = Usd.Stage.Open(layer), []
+    lights = [prim for prim in opened_stage.Traverse() if _is_light(prim)]
     for group, multiplier in multipliers.items():
         members = lights_of_group(lights, group)
         if not members or any(map(_is_animated, members)):
             left.append(group)
             continue
+        times = {Usd.TimeCode(frame): lit[group] for frame, lit in by_frame.items()}
         for prim in members:
             override = layer_stage.OverridePrim(prim.GetPath())
-            if not by_frame:
-                _multiply(override, prim, multiplier, Usd.TimeCode.Default(), primaries)
-            for frame, at_frame in (by_frame or {}).items():
-                _multiply(override, prim, at_frame[group], Usd.TimeCode(frame), primaries)
-    layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
-    usd.like_stage(layer, stage)
-    spaces = usd.unknown_spaces(opened_stage)
-    return usd.Overrides(layer.ExportToString(), tuple(left), unknown_spaces=spaces)
+            for time, factor in (times or {Usd.TimeCode.Default(): multiplier}).items():
+                _multiply(override, prim, factor, time, primaries)
+    return tuple(left)
 
 
 def lights_of_group(lights: Sequence[Any], group: str) -> list[Any]:

@@ -12,7 +12,7 @@ from lightpaint.relit.export.usd import usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 
 pytest.importorskip("pxr.UsdLux", reason="usd-core")
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdRender
 
 #: Attributes of USD's colours and intensities are float32.
 FLOAT32 = 1e-6
@@ -169,6 +169,60 @@ def test_colors_are_in_the_space_of_the_stage(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             level * np.array(api.GetColorAttr().Get()), white * to_acescg @ RGB, rtol=1e-4
         )
+
+
+@pytest.mark.skipif(not hasattr(Usd, "ColorSpaceAPI"), reason="USD 24.11")
+@pytest.mark.parametrize("name", ["lin_ap1_scene", "ACEScg", "ACES - ACEScg"])
+def test_colors_without_a_space_are_in_the_rendering_space(tmp_path: Path, name: str) -> None:
+    """UsdLux: the colour of the emitted light, in the rendering colour space."""
+    stage = made_stage(tmp_path / "hall.usda")
+    settings = UsdRender.Settings.Define(stage, "/Render/final")
+    settings.CreateRenderingColorSpaceAttr(name)
+    stage.SetMetadata("renderSettingsPrimPath", "/Render/final")
+    stage.Save()
+    overrides = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path)
+    assert not overrides.unknown_spaces
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    # USD's matrices have the white of the ACES in five digits.
+    np.testing.assert_allclose(
+        shine(relit.GetPrimAtPath("/hall/lamps/panel")), from_rec709(ACESCG) @ RGB, rtol=1e-4
+    )
+
+
+def test_a_space_that_usd_does_not_know_is_named(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    settings = UsdRender.Settings.Define(stage, "/Render/final")
+    settings.CreateRenderingColorSpaceAttr("studio_linear")
+    stage.SetMetadata("renderSettingsPrimPath", "/Render/final")
+    stage.Save()
+    overrides = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path)
+    assert overrides.unknown_spaces == ("studio_linear",)
+
+
+def test_what_nodes_make_of_a_light_is_written_over(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    light = UsdLux.LightAPI(stage.GetPrimAtPath("/hall/lamps/panel"))
+    for attribute in (light.GetColorAttr(), light.GetIntensityAttr()):
+        attribute.AddConnection("/hall/gel.outputs:value")
+    stage.Save()
+    overrides = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path)
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    panel = UsdLux.LightAPI(relit.GetPrimAtPath("/hall/lamps/panel"))
+    for attribute in (panel.GetColorAttr(), panel.GetIntensityAttr()):
+        assert attribute.GetConnections() == []
+    np.testing.assert_allclose(shine(panel.GetPrim()), RGB, rtol=FLOAT32)
+
+
+def test_an_image_says_in_which_space_it_is(tmp_path: Path) -> None:
+    made_stage(tmp_path / "hall.usda")
+    overrides = usd_overrides([], tmp_path / "hall.usda", tmp_path, panels={"panel": "panel.exr"})
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    panel = relit.GetPrimAtPath("/hall/lamps/panel")
+    texture = UsdLux.RectLight(panel).GetTextureFileAttr()
+    assert (texture.Get().path, texture.GetColorSpace()) == ("./panel.exr", "lin_rec709_scene")
 
 
 def test_nothing_else_of_the_stage_changes(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from command import run, succeed
 from light_groups import interleaved, pictures
 
+from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709, to_rec709
 from lightpaint.errors import OutputError
 from lightpaint.relit.export.usd_groups import usd_multipliers
 
@@ -91,6 +92,55 @@ def test_what_is_not_there_or_moves_is_left(tmp_path: Path) -> None:
     stage.Save()
     names = ("key", "fill", "gone")
     assert layer(tmp_path, dict.fromkeys(names, MULTIPLIER)).left == names
+
+
+def test_what_nodes_make_is_left(tmp_path: Path) -> None:
+    stage = shot(tmp_path / "shot.usda")
+    key = UsdLux.LightAPI(stage.GetPrimAtPath("/world/lights/key"))
+    key.GetColorAttr().AddConnection("/world/gel.outputs:color")
+    stage.Save()
+    assert layer(tmp_path, {"key": MULTIPLIER}).left == ("key",)
+
+
+@pytest.mark.skipif(not hasattr(Usd, "ColorSpaceAPI"), reason="USD 24.11")
+@pytest.mark.parametrize("declared", ["", "lin_ap1_scene", "lin_rec2020_scene"])
+def test_light_is_multiplied_in_the_primaries_of_the_renderer(
+    tmp_path: Path, declared: str
+) -> None:
+    """A renderer that works in ACEScg multiplies colour, temperature and texture there."""
+    stage = shot(tmp_path / "shot.usda")
+    key = UsdLux.RectLight.Get(stage, "/world/lights/key")
+    key.CreateEnableColorTemperatureAttr(True)
+    key.CreateTextureFileAttr("window.exr")
+    if declared:
+        space = Usd.ColorSpaceAPI.Apply(stage.GetPrimAtPath("/world"))
+        space.CreateColorSpaceNameAttr().Set(declared)
+    stage.Save()
+    path = tmp_path / "lights.usda"
+    text = usd_multipliers(
+        {"key": MULTIPLIER}, tmp_path / "shot.usda", tmp_path, primaries=ACESCG
+    ).text
+    path.write_text(text, encoding="utf-8")
+    before, _ = light(tmp_path / "shot.usda", "/world/lights/key")
+    after, _ = light(path, "/world/lights/key")
+    # From the space of the colour to the renderer's; an undeclared one is that.
+    to_own = np.eye(3)
+    if declared == "lin_rec2020_scene":
+        to_own = from_rec709(ACESCG) @ to_rec709(REC2020)
+    own = to_own @ after / (to_own @ before)
+    # USD's matrices have the white of the ACES in five digits.
+    np.testing.assert_allclose(own, from_rec709(ACESCG) @ MULTIPLIER, rtol=1e-3)
+    # What else multiplies the light stays.
+    relit = Usd.Stage.Open(str(path))
+    again = UsdLux.RectLight.Get(relit, "/world/lights/key")
+    assert again.GetEnableColorTemperatureAttr().Get()
+    assert again.GetTextureFileAttr().Get().path == "window.exr"
+
+
+def test_a_layer_warns_of_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    shot(tmp_path / "shot.usda")
+    layer(tmp_path, {"key": MULTIPLIER})
+    assert capfd.readouterr() == ("", "")
 
 
 def test_no_stage(tmp_path: Path) -> None:
