@@ -56,6 +56,15 @@ def with_nodes(light):
     emission.inputs["Color"].default_value = (0.5, 1, 1, 1)
 
 
+def with_profile(light):
+    """Multiply a lamp by the profile of an IES file."""
+    if light.node_tree is None:
+        light.use_nodes = True
+    tree = light.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(tree.nodes.new("ShaderNodeTexIES").outputs[0], emission.inputs["Strength"])
+
+
 def with_node_group(light):
     """Let a group make the light of a lamp."""
     group = bpy.data.node_groups.new("gel", "ShaderNodeTree")
@@ -133,6 +142,8 @@ def main():
     with_nodes(lamps[0].data)
     grouped = lamp("grouped", "POINT")
     with_node_group(grouped.data)
+    profile = lamp("profile", "POINT")
+    with_profile(profile.data)
     bpy.ops.mesh.primitive_plane_add(
         size=0.02, location=(0, 0, HEIGHT), rotation=(3.14159265, 0, 0)
     )
@@ -150,7 +161,7 @@ def main():
     runpy.run_path(str(FOLDER / "set_scene.py"))
     radiances = {}
     for one in (*lamps, panel, None):
-        for other in (*lamps, grouped, panel):
+        for other in (*lamps, grouped, profile, panel):
             other.hide_render = other is not one
         scene.world = world if one is None else None
         radiances["sky" if one is None else one.name] = radiance()

@@ -28,7 +28,7 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
         **dict.fromkeys(("panel", "desk", "sky", *MESHES), "radiance"),
-        **dict.fromkeys(("bulb", "spot", "grouped", "tile", "wrong sun"), "intensity"),
+        **dict.fromkeys(("bulb", "spot", "grouped", "profile", "tile", "wrong sun"), "intensity"),
         **dict.fromkeys(("sun", "wrong bulb"), "irradiance"),
         "gone": "radiance",
     }
@@ -39,7 +39,8 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     assert "lightpaint: 'gone' is left as it is" in output
     for name in ("dome", "wrong sun", "wrong bulb"):
         assert f"lightpaint: '{name}' is left as it is" in output
-    assert "lightpaint: nodes of 'grouped' change its light" in output
+    for name in ("grouped", "profile"):
+        assert f"lightpaint: nodes of '{name}' change its light" in output
     assert "nodes of 'bulb'" not in output
     for name, is_whole in MESHES.items():
         assert (f"nodes of '{name}'" in output) != is_whole, name
