@@ -9,6 +9,7 @@ import pytest
 from studio_client import StudioClient
 
 import lightpaint as lp
+from lightpaint.colour import ACESCG
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_sums import DRAFTS_PER_SUM, SmallFilm
 from lightpaint.paint import protocol
@@ -71,6 +72,28 @@ def test_a_page_is_told_of_mixes_and_no_plane_is_denoised(client: StudioClient) 
 
 def test_few_lights_have_their_planes_in_the_page(basis: lp.Basis) -> None:
     assert not picture_table.has_mixes(basis)
+
+
+def test_lights_that_a_renderer_multiplies_in_its_own_primaries_are_mixed(
+    make_basis: Any, tmp_path: Path, without_reasons: None
+) -> None:
+    plain = make_basis(3, size=(H, W))
+    basis = replace(plain, origin=replace(plain.origin, primaries=ACESCG))
+    client = StudioClient(tmp_path, basis)
+    weights = np.array([[2.0, 0.5, 0.1], [0.1, 1.0, 2.0], [0.5, 0.5, 0.5]])
+    try:
+        assert client.studio.state().fields["views"][0]["has_mixes"]
+        mixed(client, weights, is_clean=False)
+        exact = client.wait(lambda m: m.kind == "mixed" and m.is_exact).data.astype(np.float32)
+        # Halves have eleven bits.
+        np.testing.assert_allclose(exact, basis.mix(weights), rtol=2.0**-10)
+        apart = np.abs(plain.mix(weights) - exact)
+        assert apart.mean() > 0.03 * exact.mean()
+        live = client.studio.session.views[0].live
+        for average in (live.small_picture(weights), live.draft(weights)):
+            np.testing.assert_allclose(average, live.averaged(basis.mix(weights)), rtol=1e-4)
+    finally:
+        client.studio.close()
 
 
 def test_a_draft_of_lights_without_edges_is_their_sum(

@@ -7,8 +7,8 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
-from lightpaint.basis import Basis, Planes, array_name, array_once, read_look
-from lightpaint.colour import ViewTransform
+from lightpaint.basis import Basis, Planes, array_name, array_once, multipliers_in, read_look
+from lightpaint.colour import ViewTransform, from_rec709, to_rec709
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.step_search import search_step
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
@@ -141,7 +141,7 @@ class SmallFilm:
         name = array_name(f"averages of {side}", basis.emitters_seen)
         #: (3, n, p) float32, which suffices for averages: sums of it take half the time.
         self.rows: Floats = array_once(basis.planes, name, lambda: self._averages(basis.planes))
-        self._owns_rows = False
+        self._owns_rows, self._primaries = False, basis.origin.primaries
         self._draft: tuple[Floats, Floats, int] | None = None
         #: (3, p), of the visible surfaces; 1 where it is not known.
         self.albedo: Floats = np.ones(self.rows.shape[::2], np.float32)
@@ -196,6 +196,7 @@ class SmallFilm:
             self.rows, self._owns_rows = self.rows.copy(), True
         for k in lights:
             self.rows[:, k] = _planes(self.average(basis.planes.plane(k)))
+        self.__dict__.pop("_multiplied_rows", None)
 
     def update(self, region: Slices) -> None:
         """Average anew the blocks that a rectangle touches."""
@@ -277,24 +278,39 @@ class SmallFilm:
     def mix(self, weights: Doubles) -> Floats:
         """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
         # In float32, as the averages are: many lights would be copied as float64.
-        columns = weights.T.astype(np.float32)
-        mixed = np.stack([w @ rows for w, rows in zip(columns, self.rows, strict=True)], axis=-1)
-        return np.asarray(mixed.reshape(*self._size, 3), np.float32)
+        columns = multipliers_in(self._primaries, weights).T.astype(np.float32)
+        channels = [w @ rows for w, rows in zip(columns, self._multiplied_rows, strict=True)]
+        return self._picture(np.stack(channels))
+
+    @cached_property
+    def _multiplied_rows(self) -> Floats:
+        """`rows` in the primaries in which the renderer multiplies."""
+        if not self._primaries:
+            return self.rows
+        own = from_rec709(self._primaries).astype(np.float32)
+        return np.tensordot(own, self.rows, axes=1)
+
+    def _picture(self, channels: Floats) -> Floats:
+        """Return channels in these primaries, (3, p), as a picture (h', w', 3)."""
+        if self._primaries:
+            channels = to_rec709(self._primaries) @ channels
+        return np.asarray(channels.T.reshape(*self._size, 3), np.float32)
 
     def draft(self, weights: Doubles) -> Floats:
         """Return the same as `mix` but for round-off, from the last draft if few lights differ."""
-        columns = weights.T.astype(np.float32)
+        columns = multipliers_in(self._primaries, weights).T.astype(np.float32)
         channels, before, count = self._draft or (None, columns, 0)
         changed = np.flatnonzero((columns != before).any(axis=0))
         with one_thread():
             if channels is None or count == DRAFTS_PER_SUM or 2 * len(changed) > len(weights):
-                count, pairs = 0, zip(columns, self.rows, strict=True)
+                count, pairs = 0, zip(columns, self._multiplied_rows, strict=True)
                 channels = np.stack([w @ rows for w, rows in pairs])
             else:
-                steps, rows = (columns - before)[:, changed], (x[changed] for x in self.rows)
+                steps = (columns - before)[:, changed]
+                rows = (x[changed] for x in self._multiplied_rows)
                 channels = channels + [w @ x for w, x in zip(steps, rows, strict=True)]
         self._draft = channels, columns, count + 1
-        return channels.T.reshape(*self._size, 3)
+        return self._picture(channels)
 
     def lights_at(self, row: int, column: int) -> Floats:
         """Return the light of all planes in the block of a pixel, the nearest outside, (n, 3)."""

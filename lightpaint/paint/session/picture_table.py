@@ -165,11 +165,13 @@ def opens_plain(basis: Basis) -> bool:
 
 
 def has_mixes(basis: Basis) -> bool:
-    """Return whether the session mixes the pictures of a page, which has no planes.
+    """Return whether the session mixes the pictures of a page, which has no planes: of many lights,
+    and where a renderer multiplies them in its own primaries.
 
     basis: as in `page_factor`.
     """
-    return opens_plain(basis) and len(basis.lights) >= MIN_MIXED_LIGHTS
+    is_many = opens_plain(basis) and len(basis.lights) >= MIN_MIXED_LIGHTS
+    return is_many or bool(basis.origin.primaries)
 
 
 def plane_size(basis: Basis) -> tuple[int, int]:
