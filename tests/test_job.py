@@ -1,5 +1,6 @@
 """A job: checked when it is born, and the same wherever it is sent."""
 
+import io
 import json
 import os
 import subprocess
@@ -10,7 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 from light_groups import channels, interleaved, pictures, write
+from picture_files import layered, psd
+from PIL import Image
 from renderer import LIGHTS, write_room
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
@@ -26,6 +30,7 @@ from lightpaint.errors import (
     SizeError,
     TargetError,
 )
+from lightpaint.images import picture_size
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene_reader import load_scene
@@ -392,3 +397,37 @@ def test_a_painting_over_a_smaller_template_is_solved_at_its_size(room: Path, tm
         with pytest.raises(SizeError, match=f"target half is {width}x{height} but the basis is"):
             job(target, **options)
     assert job(smaller, resize=True).views[0].target.size == scene.size
+
+
+@pytest.mark.parametrize("kind", ["png", "tif", "psd", "ora", "exr"])
+def test_a_painting_of_another_size_is_not_decoded(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """The heads of both files say it: a large picture takes seconds to decode."""
+    pixels, png = np.full((17, 23, 3), 90, np.uint8), io.BytesIO()
+    Image.fromarray(pixels).save(png, "PNG")
+    contents = {"png": png.getvalue(), "psd": psd(pixels), "ora": layered(png.getvalue())}
+    path = folder / f"large.{kind}"
+    if kind == "exr":
+        write_rgb(path, pixels.astype(np.float32))
+    elif kind == "tif":
+        tifffile.imwrite(path, pixels, photometric="rgb")
+    else:
+        path.write_bytes(contents[kind])
+    assert picture_size(path) == (17, 23)
+    monkeypatch.setattr("lightpaint.pipeline.job.sources.read_target", _not_to_be_called)
+    for basis in (BasisFile("a.basis.exr"), GroupsFile("groups.exr")):
+        with pytest.raises(SizeError, match=rf"large\.{kind} is 23x17 but the basis is"):
+            Job((), (Painting(path.name),), folder / "out", basis)
+
+
+def test_the_size_of_a_damaged_picture_is_left_to_its_reader(folder: Path) -> None:
+    for name in ("gone.png", "cut.png"):
+        (folder / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+        assert picture_size(folder / name) is None
+        with pytest.raises(LightpaintError, match=name):
+            Job((), (Painting(name),), folder / "out", BasisFile("a.basis.exr"))
+
+
+def _not_to_be_called(*_args: object, **_options: object) -> None:
+    raise AssertionError("decoded")

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from lightpaint.images.neighbourhoods import dilated, gaussian_mean, grown, number_parts
     from lightpaint.images.object_map import BACKGROUND, Objects
     from lightpaint.images.packed_picture import PackedPicture, pack_picture
-    from lightpaint.images.picture import AT_LEAST, Picture, naming_file, read_mask, read_picture
+    from lightpaint.images.picture import (
+        AT_LEAST, Picture, naming_file, picture_size, read_mask, read_picture,
+    )
     from lightpaint.images.pixel_blocks import (
         BAND_PIXELS, LARGE_PICTURE, Size, bands_of, block_mean, block_pixels, block_sums, blocks_in,
         by_bands, check_factor, check_size, covered, enlarged, fitting_factor, in_turns, is_large,

@@ -1,7 +1,7 @@
 """Reads pictures in any format of paint programs, as linear Rec.709."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,16 +14,17 @@ from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.formats.bitmap import (
     Bitmap,
+    bitmap_size,
     light_of_floats,
     light_of_integers,
     read_bitmap,
     transform_of,
     unpremultiply,
 )
-from lightpaint.images.formats.exr import ExrPart, read_parts
+from lightpaint.images.formats.exr import ExrPart, read_headers, read_parts
 from lightpaint.images.formats.exr_layers import ALPHA_NAMES, RGB_NAMES, ExrLayer, choose_layer
 from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
-from lightpaint.images.formats.openraster import LAYERED, layered_kind, read_merged
+from lightpaint.images.formats.openraster import LAYERED, layered_kind, merged_size, read_merged
 
 Mask = npt.NDArray[np.bool_]
 
@@ -101,6 +102,19 @@ def read_picture(
         raise ImageError(path, " needs more memory than there is") from None
     except OSError as error:
         raise ImageError("cannot read ", path, f": {error.strerror or error}") from error
+
+
+def picture_size(path: str | Path) -> tuple[int, int] | None:
+    """Return the (height, width) of the picture in a file, without decoding it; None if its head
+    does not say it, or is damaged, which reading it reports.
+    """
+    path = Path(path)
+    with suppress(ImageError, OSError, MemoryError):
+        kind = file_kind(path)
+        if kind == "exr":
+            return read_headers(path)[1]
+        return merged_size(path) if kind in LAYERED.values() else bitmap_size(path, kind)
+    return None
 
 
 def read_mask(path: str | Path) -> npt.NDArray[np.float32]:

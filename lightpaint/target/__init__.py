@@ -7,7 +7,7 @@ from lightpaint.lazy_names import lazy_names
 if TYPE_CHECKING:
     # fmt: off
     from lightpaint.target.painted_target import (
-        PASS_RESIZE, Target, Wish, separate, titled, write_painting,
+        PASS_RESIZE, Target, Wish, check_fits, separate, titled, write_painting,
     )
     from lightpaint.target.target_reader import Paint, read_over_look, read_target
     from lightpaint.target.template import (

@@ -352,13 +352,8 @@ class Target(Shown):
         images.check_size(size)
         if factor := images.whole_factor(self.size, size):
             return self.reduced(factor)
-        if self.size != size and not resize:
-            raise SizeError(
-                self.title,
-                f" is {self.size[1]}x{self.size[0]} but the basis is "
-                f"{size[1]}x{size[0]}: export it at that size, or ",
-                PASS_RESIZE,
-            )
+        if not resize:
+            check_fits(self.title, self.size, size)
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
@@ -369,6 +364,20 @@ class Target(Shown):
                 " does not stretch",
             )
         return self.resized(size)
+
+
+def check_fits(title: object, size: tuple[int, int], needed: tuple[int, int]) -> None:
+    """Raise SizeError if a painting has no square block of pixels for each pixel of a basis.
+
+    title: of the painting. size, needed: (height, width) of both.
+    """
+    if images.whole_factor(size, needed) is None:
+        raise SizeError(
+            title,
+            f" is {size[1]}x{size[0]} but the basis is {needed[1]}x{needed[0]}: export it at that "
+            "size, or ",
+            PASS_RESIZE,
+        )
 
 
 def _check_is_light(title: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:

@@ -55,6 +55,10 @@ PSD_COLOURS = {1: "grey", 3: "RGB"}
 PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
 
 
+#: EXIF's orientations in which a picture's rows are its columns.
+TURNED = (5, 6, 7, 8)
+
+
 @dataclass(frozen=True)
 class Bitmap:
     """A picture as stored numbers.
@@ -143,7 +147,24 @@ def _read_head(path: Path, kind: str) -> _Head:
     return _Head()
 
 
-def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
+def bitmap_size(path: Path, kind: str) -> tuple[int, int]:
+    """Return the (height, width) of a picture from the head of its file, as `read_bitmap` has it.
+
+    Raises ImageError, without naming the file, if the head is damaged.
+    """
+    _read_head(path, kind)
+    file = _opened(path)
+    try:
+        spec = file.spec()
+        _check_size(spec)
+        turned = spec.get_int_attribute("Orientation", 1) in TURNED
+        return (spec.width, spec.height) if turned else (spec.height, spec.width)
+    finally:
+        file.close()
+
+
+def _opened(path: Path) -> Any:
+    """Return a file opened by OpenImageIO. Raises ImageError, without naming the file."""
     import OpenImageIO
 
     OpenImageIO.geterror()  # clears the error of an earlier file
@@ -152,6 +173,11 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
     file = OpenImageIO.ImageInput.open(str(path), spec)
     if file is None:
         raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), path=path)}")
+    return file
+
+
+def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
+    file = _opened(path)
     try:
         if file.format_name() != kind:
             raise ImageError(f"is damaged: it begins like {kind.upper()} but is not")
@@ -222,7 +248,7 @@ def _largest(dtype: np.dtype[Any]) -> int:
 
 def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
     """Return pixels rotated and mirrored according to EXIF's Orientation."""
-    if orientation in (5, 6, 7, 8):
+    if orientation in TURNED:
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
         pixels = pixels[::-1]

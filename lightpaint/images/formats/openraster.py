@@ -80,6 +80,19 @@ def read_merged(path: Path, kind: str) -> Bitmap:
             return replace(read_bitmap(merged, "png"), kind=kind)
 
 
+def merged_size(path: Path) -> tuple[int, int]:
+    """Return the (height, width) of the merged picture of a layered file, from its head alone.
+
+    Raises ImageError, without naming the file.
+    """
+    with (
+        naming_damage(),
+        zipfile.ZipFile(path) as archive,
+        archive.open(_member(archive, MERGED_PICTURE)) as packed,
+    ):
+        return png_size(packed.read(PNG_HEAD))
+
+
 @contextmanager
 def naming_damage() -> Iterator[None]:
     """Turn the errors of a damaged archive, or of a list in it, into an ImageError in one line."""

@@ -9,7 +9,14 @@ from typing import Any
 from lightpaint.basis import Basis, LightGroups, render, with_equal_lights
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
-from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
+from lightpaint.images import (
+    MISSING_REMARK,
+    Size,
+    left_over,
+    oidn_is_installed,
+    picture_size,
+    whole_factor,
+)
 from lightpaint.lighting import Constraints, check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
@@ -19,13 +26,35 @@ from lightpaint.scene.lights.texels import CHILDREN, DOMAINS, Sky, mirrored_pair
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target import Target
+from lightpaint.target import Target, check_fits
 
 #: Emitters that shine from all directions.
 SKY_PLUGINS = [plugin for plugin, domain in DOMAINS.items() if isinstance(domain, Sky)]
 
 #: Bytes of memory above which a basis gets a remark.
 MUCH_MEMORY = 2e9
+
+
+def check_sizes(targets: Sequence[Any], bases: Sequence[Any], settings: Settings) -> None:
+    """Raise SizeError for a painting of another size than its basis, before any is decoded.
+
+    targets, bases: as given.
+    """
+    for target, basis in zip(targets, bases, strict=False):
+        if settings.resize or not isinstance(target, Painting):
+            continue
+        size, needed = picture_size(target.path), _size_of(basis)
+        if size is not None and needed is not None:
+            check_fits(Path(target.path), size, needed)
+
+
+def _size_of(basis: Any) -> Size | None:
+    """Return the (height, width) of a basis, of a file of one from its head; None of a folder."""
+    if isinstance(basis, LightGroups):
+        return basis.basis.size
+    if isinstance(basis, Basis):
+        return basis.size
+    return picture_size(basis.path) if Path(basis.path).is_file() else None
 
 
 def check_inputs(
