@@ -2,13 +2,13 @@
 and within a limited time; and their names, checked and quoted.
 """
 
+import _thread
 import errno
 import os
 import re
 import shutil
 import stat
 import tempfile
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -33,6 +33,9 @@ MAX_TEXT, CHUNK = 2**26, 2**22
 
 #: Seconds in which a file must answer; a sleeping drive wakes up in less.
 FILE_TIMEOUT_S = 30.0
+
+#: Seconds in which a thread begins, however busy the machine is.
+THREAD_START_S = 30.0
 
 _Result = TypeVar("_Result")
 
@@ -280,17 +283,25 @@ def call_with_timeout(work: Callable[[], _Result], timeout_s: float, reason: str
     """Return the result of `work` or raise its error; raise TimeoutError if it takes too long.
 
     timeout_s: seconds to wait. reason: text to add to the message of a TimeoutError. The work goes
-    on in a daemon thread, for which the process does not wait at its end.
+    on in a thread for which the process does not wait at its end. Raises RuntimeError without the
+    memory for one.
     """
     answers: SimpleQueue[tuple[_Result | None, BaseException | None]] = SimpleQueue()
+    begun: SimpleQueue[None] = SimpleQueue()
 
     def answer() -> None:
+        begun.put(None)
         try:
             answers.put((work(), None))
         except BaseException as error:
             answers.put((None, error))
 
-    threading.Thread(target=answer, daemon=True).start()
+    # `Thread.start` waits for ever for a thread that lacks the memory for its first step.
+    _thread.start_new_thread(answer, ())
+    try:
+        begun.get(timeout=THREAD_START_S)
+    except Empty:
+        raise RuntimeError("can't start new thread") from None
     try:
         result, failure = answers.get(timeout=timeout_s)
     except Empty:

@@ -3,6 +3,8 @@
 import errno
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -193,12 +195,14 @@ class HalfWay:
 def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither where it is asked what there is, nor where it is read, at once or half-way."""
     room = folder / "room.xml"
-    open_again, asleep = threading.Event(), []
+    open_again, awake, asleep = threading.Event(), threading.Semaphore(0), 0
     monkeypatch.setattr(files, "FILE_TIMEOUT_S", 0.05)
 
     def sleeps(*_: object) -> Any:
-        asleep.append(threading.current_thread())
+        nonlocal asleep
+        asleep += 1
         open_again.wait(AT_ONCE)
+        awake.release()
         return nullcontext()
 
     half_way = HalfWay(sleeps)
@@ -220,10 +224,28 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
             with pytest.raises(SceneError, match=r"cannot read .*room\.xml: no answer within"):
                 files.read_text(room, "scene file", SceneError)
             assert time.monotonic() - start_s < PATIENCE_S
-    assert all(thread.daemon for thread in asleep)  # none is waited for at the end
+    assert asleep == 5
     open_again.set()
-    for thread in asleep:
-        thread.join()
+    for _ in range(asleep):
+        assert awake.acquire(timeout=PATIENCE_S)
+
+
+def test_a_process_does_not_wait_for_such_a_drive_at_its_end() -> None:
+    code = (
+        "from threading import Event\nfrom lightpaint.files import call_with_timeout\n"
+        "call_with_timeout(Event().wait, 0.05)"
+    )
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert "TimeoutError: [Errno 110] no answer within 0.05 s" in ended.stderr
+
+
+def test_a_thread_without_memory_for_its_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python's own `Thread.start` would wait for ever."""
+    monkeypatch.setattr(files, "THREAD_START_S", 0.05)
+    monkeypatch.setattr(files._thread, "start_new_thread", lambda *_: 1)
+    with pytest.raises(RuntimeError, match="can't start new thread"):
+        files.call_with_timeout(lambda: 0, PATIENCE_S)
 
 
 @pytest.mark.parametrize("ending", [".ply", ".obj", ".serialized", ".png", ".exr"])
@@ -263,7 +285,7 @@ def test_files_that_are_read_as_they_were(tmp_path: Path) -> None:
         files.file_length(path, "file", SceneError)
 
 
-@pytest.mark.parametrize("kind", ["pipe", "sparse", "folder", "/dev/zero"])
+@pytest.mark.parametrize("kind", ["pipe", "sparse", "/dev/zero"])
 def test_a_session_that_is_none(tmp_path: Path, kind: str) -> None:
     """A copy of one, to recover it, would fill the disk."""
     made(tmp_path / "session.db", kind)

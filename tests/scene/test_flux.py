@@ -85,3 +85,11 @@ def test_a_textured_or_stretched_cone_has_no_closed_form(tmp_path: Path) -> None
     for lights in (stretched, squares):
         scene = load_scene(write_room(tmp_path, lights=lights))
         assert scene.light("beam").unit_flux is None
+
+
+def test_the_flux_of_a_rest_that_takes_light_away_is_unknown(tmp_path: Path) -> None:
+    """A light of negative intensity is not adjusted; a solve beside it writes no negative flux."""
+    dark = LIGHTS["bulb"].replace("bulb", "dark").replace('"0.5 0.6 0.7"', '"-1 1 1"')
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + dark))
+    assert scene.light("rest").unit_flux is None
+    assert scene.light("panel").unit_flux is not None

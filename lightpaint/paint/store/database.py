@@ -76,7 +76,8 @@ def open_database(path: Path | None, identity: Identity | None) -> sqlite3.Conne
     with _translated_errors(path):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            if path.exists():  # a pipe may never answer, and a copy of a sparse file fills the disk
+            # A pipe may never answer, and a copy of a sparse file fills the disk.
+            if path.exists() and not path.is_dir():
                 file_length(path, "session", PaintError, limit=MAX_SESSION, may_be_empty=True)
         database = sqlite3.connect(
             path or ":memory:", timeout=0, isolation_level=None, check_same_thread=False

@@ -80,7 +80,7 @@ class Light:
     def unit_flux(self) -> RGB | None:
         """Watts per channel of all members together at an emission of 1.
 
-        None if the flux of any member is unknown.
+        None if the flux of any member is unknown, or if a channel is negative.
         """
         total = [0.0, 0.0, 0.0]
         for member in self.members:
@@ -88,7 +88,7 @@ class Light:
                 return None
             for k, emission in enumerate(self.emission_of(member, (1.0, 1.0, 1.0))):
                 total[k] += emission * member.unit_flux
-        return total[0], total[1], total[2]
+        return None if min(total) < 0 else (total[0], total[1], total[2])
 
     def identity(self, unlit_content: str) -> str:
         """Return the identity of its image at unit emission, in a scene with this `unlit_content`.
