@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 from lightpaint.errors import OutputError
@@ -29,6 +30,9 @@ from lightpaint.signals import interruptible_between_pieces
 
 #: Name of the file by which programs find a running painter, in the same folder.
 CONNECTION_FILE = "painter.json"
+
+#: Seconds of loading after which it is announced.
+SLOW_S = 2.0
 
 
 def paint_in_browser(
@@ -57,9 +61,22 @@ def paint_in_browser(
     path = folder / SESSION_FILE
     listening = listen(host, port)  # before anything is written
     with listening[0]:
-        for subject in subjects:
-            subject.check_files()
+        with _announced_if_slow(subjects[0].name, say):
+            for subject in subjects:
+                subject.check_files()
         _serve_session(listening, subjects, on_ready, path, new=new, console=console, say=say)
+
+
+@contextmanager
+def _announced_if_slow(name: str, say: Callable[[str], None]) -> Iterator[None]:
+    """Say that `name` is being loaded if the work within takes longer than SLOW_S."""
+    timer = Timer(SLOW_S, say, (f"loading {name}; the address follows",))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _serve_session(

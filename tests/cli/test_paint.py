@@ -37,6 +37,7 @@ from lightpaint.cli.options.command_arguments import values_of
 from lightpaint.cli.options.job_options import settings_of
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import painted_of
+from lightpaint.paint import launch
 from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
@@ -170,12 +171,24 @@ def test_what_cannot_be_painted_is_said_in_one_line(
     ],
 )
 def test_a_mistake_that_files_show_is_said_before_there_is_an_address(
-    work_folder: Path, line: str, message: str
+    work_folder: Path, line: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(launch, "SLOW_S", PATIENCE_S)
     write_room(work_folder)
     (work_folder / "empty.ora").write_bytes(layered(None))
     arguments = *line.split(), "--no-browser", "--port", "0"
     assert message in run_refused(work_folder, "paint", *arguments)
+
+
+def test_a_scene_that_takes_long_to_load_is_announced(
+    work_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "SLOW_S", 0)
+    write_room(work_folder)
+    command = "paint room.xml --off lamp --no-browser --port 0"
+    lines = run(work_folder, *command.split()).stderr.splitlines()
+    assert lines[0] == "lightpaint: loading room; the address follows"
+    assert "no light 'lamp'" in lines[-1]
 
 
 @pytest.mark.usefixtures("work_folder")
