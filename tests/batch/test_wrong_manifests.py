@@ -31,6 +31,14 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
         ("defaults", "unknown key 'painting'"),
     ),
     "an unknown key": (FIRST + "masc = 'a'\n", ("look 'one'", "'masc'", "mean 'mask'")),
+    "a setting beside the settings": (
+        HEAD + "spp = 8\n" + LOOK_PARAMETER,
+        ("defaults", "unknown key 'spp': did you mean 'settings.spp'?"),
+    ),
+    "a painting that is called as on the command line": (
+        HEAD + '[[look]]\ntarget = "p0.exr"\n',
+        ("unknown key 'target': did you mean 'painting'?",),
+    ),
     "a painting that is a number": (HEAD + "[[look]]\npainting = 3\n", ("painting is 3",)),
     "a camera without spectra": (
         FIRST + 'settings = { observer = "alexa" }\n',

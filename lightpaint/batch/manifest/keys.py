@@ -60,6 +60,9 @@ MAX_FRAMES = 10_000
 #: Keys of arguments that a manifest calls by another name.
 OTHER_NAMES = {"find": "find_template", "transform": "view"}
 
+#: Keys whose values the command line has by other names.
+COMMAND_NAMES = {"target": "painting", "targets": "paintings"}
+
 
 def parse_variations(names: Iterable[str]) -> tuple[str, ...]:
     """Return variations by their words, each once; hyphens may stand for spaces.
@@ -354,13 +357,7 @@ class Mistakes:
         valid = set()
         for key, value in table.items():
             if key not in keys:
-                suggestion = near_key(key, keys)
-                hint = (
-                    f": did you mean {suggestion!r}?"
-                    if suggestion
-                    else f"; known are {', '.join(keys)}"
-                )
-                self.add(label, f"unknown key {key!r}{hint}")
+                self.add(label, f"unknown key {key!r}{_hint_of(key, keys)}")
                 continue
             if keys[key].is_valid(value):
                 valid.add(key)
@@ -409,9 +406,18 @@ class Mistakes:
         return replace(request, stage=str(base / request.stage) if request.stage else "")
 
 
+def _hint_of(key: str, keys: Iterable[str]) -> str:
+    """Return what an unknown key of a table may mean, or else all that are known."""
+    names = list(keys)
+    belongs = f"settings.{key}" if key in SETTINGS and "settings" in names else ""
+    suggestion = belongs or near_key(key, names)
+    return f": did you mean {suggestion!r}?" if suggestion else f"; known are {', '.join(names)}"
+
+
 def near_key(key: str, keys: Iterable[str]) -> str:
     """Return the known key that a misspelt one probably stands for; "" where none is near."""
-    return next(iter(difflib.get_close_matches(key, list(keys), 1)), "")
+    meant = COMMAND_NAMES.get(key, key)
+    return next(iter(difflib.get_close_matches(meant, list(keys), 1)), "")
 
 
 def as_key(datum: Datum) -> str | None:
