@@ -30,7 +30,7 @@ from lightpaint.colour.color import C2, ciede2000, lab, matching_functions
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 from lightpaint.display_text import some_names
 from lightpaint.errors import ColorError, RigError
-from lightpaint.files import one_line, read_bytes, read_text
+from lightpaint.files import one_line, read_bytes
 from lightpaint.storage.rig_archive import RigArchive
 
 #: Nanometres of a spectrum, and the distance between two.
@@ -221,8 +221,7 @@ def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
     if path.suffix.lower() in TM27:
         points = _points_of_tm27(read_bytes(path, "spectrum", ColorError, limit=MAX_BYTES), path)
     else:
-        text = read_text(path, "spectrum", ColorError, limit=MAX_BYTES)
-        points = _points_of_table(text, path, "nanometres and power", 2)
+        points = _points_of_table(_table_text(path, "spectrum"), path, "nanometres and power", 2)
     return _curve(points, path)
 
 
@@ -237,8 +236,9 @@ def read_sensitivities(path: Path) -> tuple[Doubles, Doubles]:
 
     Raises ColorError for a file that is missing, or has no three curves of visible light.
     """
-    text = read_text(path, "observer", ColorError, limit=MAX_BYTES)
-    points = _points_of_table(text, path, "nanometres, red, green and blue", 4)
+    points = _points_of_table(
+        _table_text(path, "observer"), path, "nanometres, red, green and blue", 4
+    )
     return _measured(points, path, "the sensitivity")
 
 
@@ -255,16 +255,20 @@ def _measured(
 def measured_points(
     points: Sequence[tuple[float, ...]], what: str = "the power"
 ) -> tuple[Doubles, Doubles]:
-    """Return nanometres (k,) and values (k, n) of measured points, checked, without their noise.
+    """Return nanometres (k,), rising, and values (k, n) of measured points, checked, without their
+    noise.
 
-    what: the values in words. Raises ColorError, which says what is wrong without a name.
+    points: with rising or falling wavelengths. what: the values in words. Raises ColorError, which
+    says what is wrong without a name.
     """
     if not FEWEST_POINTS <= len(points) <= MAX_POINTS:
         raise ColorError(f"has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}")
     table = np.array(points, np.float64)
-    waves, values = table[:, 0], table[:, 1:]
     if not np.isfinite(table).all():
         raise ColorError("has a number that is not finite")
+    if (np.diff(table[:, 0]) < 0).all():  # as some instruments scan
+        table = table[::-1]
+    waves, values = table[:, 0], table[:, 1:]
     if (falls := np.flatnonzero(np.diff(waves) <= 0)).size:
         k = int(falls[0])
         raise ColorError(f"goes from {waves[k]:g} to {waves[k + 1]:g} nm: wavelengths have to rise")
@@ -282,6 +286,16 @@ def measured_points(
     return waves, np.maximum(values, 0)
 
 
+def _table_text(path: Path, kind: str) -> str:
+    """Return the text of a table in UTF-8, in UTF-16 or, as spreadsheets export it, in Latin-1."""
+    data = read_bytes(path, kind, ColorError, limit=MAX_BYTES)
+    encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
 def _points_of_table(text: str, path: Path, what: str, width: int) -> list[tuple[float, ...]]:
     """Return the points of a table, whose first lines may be a heading.
 
@@ -290,7 +304,8 @@ def _points_of_table(text: str, path: Path, what: str, width: int) -> list[tuple
     points: list[tuple[float, ...]] = []
     wrong = ""
     for number, line in enumerate(text.splitlines(), 1):
-        # A comma between digits of a semicolon's or tab's table is a decimal one.
+        # A comma inside quotes, or between digits of a semicolon's or tab's table, is a decimal.
+        line = re.sub(r'"([^"]*)"', lambda quoted: quoted[1].replace(",", "."), line)
         if ";" in line or "\t" in line:
             line = line.replace(",", ".")
         cells = re.split(r"[,;\s]+", line.split("#")[0].strip(" ,;\t"))

@@ -71,7 +71,18 @@ TABLES = {
     "text": "# of an LED\n" + _table("{:g}\t{:.4f}"),
     "semicolons": "Wellenlaenge;Leistung\n" + _table("{:g};{:g}").replace(".", ","),
     "spaces": _table("  {:g}   {:e}"),
+    "quotes": '"nm","power"\n' + _table('"{:g}","{:g}"'),
+    "quoted decimal commas": _table('"{:g}","{:g}"').replace(".", ","),
+    "falling": "\n".join(reversed(_table("{:g},{:g}").splitlines())),
 }
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-8-sig"])
+def test_tables_are_read_as_spreadsheets_encode_them(encoding: str, tmp_path: Path):
+    text = "Wellenlänge;Leistung\r\n" + _table("{:g};{:g}").replace(".", ",")
+    (tmp_path / "led.csv").write_bytes(text.encode(encoding))
+    waves, powers = named_spectrum("led.csv", tmp_path)
+    assert powers == pytest.approx(1 + waves / 1000, abs=1e-4)
 
 
 @pytest.mark.parametrize("kind", TABLES)
