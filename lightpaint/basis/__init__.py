@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     )
     from lightpaint.basis.file.basis_file import is_basis_file, is_large, read_basis, write_basis
     from lightpaint.basis.file.file_planes import spooled
-    from lightpaint.basis.light_basis import Basis, Origin, meter_exposure
+    from lightpaint.basis.light_basis import (
+        Basis, Origin, as_multiplied, can_be_multiplied, channel_responses, meter_exposure,
+    )
     from lightpaint.basis.lightgroups.frame_sequence import (
         SIGN, FrameSequence, find_frames, is_pattern, parse_frames, spoken_frames,
     )

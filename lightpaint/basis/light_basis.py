@@ -396,52 +396,18 @@ class Basis(Shown):
 
         weights: (n, 3), as lights are ordered, finite. Raises BasisError for others.
         """
-        self._check_weights(weights)
         return np.asarray(self.mixes(np.asarray(weights)[None])[0])
 
     def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return several mixes, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        """Return several mixes, (k, h, w, 3), in one walk.
+
+        weights: (k, n, 3). Raises BasisError as `mix` does.
+        """
+        for each in weights:
+            self._check_weights(each)
         if self.origin.primaries:
             return mixes_in(self.origin.primaries, self.planes, weights)
         return self.planes.mixes(weights)
-
-    @property
-    def can_be_multiplied(self) -> bool:
-        """True if its renderer multiplies lights in other primaries than Rec.709."""
-        return bool(self.origin.primaries) and any(light.plugin == REST for light in self.lights)
-
-    def channel_responses(self) -> Planes:
-        """Return planes that say what a change of a single channel changes in this channel; of the
-        lights that stay those as they are. See `as_multiplied`.
-        """
-        adjusted = [k for k, light in enumerate(self.lights) if not light.is_fixed]
-        planes = {k: response_in(self.origin.primaries, self.planes.plane(k)) for k in adjusted}
-        return self.planes.replaced(planes)
-
-    def _planes_at(self, weights: Doubles) -> Planes:
-        """Return planes that add up to what the renderer shows of each light at weights (n, 3)."""
-        primaries, planes = self.origin.primaries, self.planes
-        adjusted = [k for k, light in enumerate(self.lights) if not light.is_fixed]
-        return planes.replaced(
-            {k: picture_at(primaries, planes.plane(k), weights[k]) for k in adjusted}
-        )
-
-    def as_multiplied(self, weights: Doubles, planes: Planes | None = None) -> "Basis":
-        """Return a basis whose planes add up to `mix` at some weights, (n, 3): what multiplying in
-        the renderer's primaries changes there is in the lights and, where they are off, in its
-        `rest`. Its current look stays.
-
-        planes: of the lights, such as `channel_responses`, by default their pictures at `weights`.
-        """
-        planes = self._planes_at(weights) if planes is None else planes
-        rest = next(k for k, light in enumerate(self.lights) if light.plugin == REST)
-        change = self.mix(weights) - planes.mix(weights)
-        return replace(
-            self,
-            planes=planes.replaced({rest: planes.plane(rest) + change}),
-            origin=replace(self.origin, primaries=()),
-            former=Estimate(self.current_look, self.current_noise),
-        )
 
     def _check_weights(self, weights: Doubles) -> None:
         """Raise BasisError unless there are three finite weights for each light."""
@@ -468,6 +434,49 @@ class Basis(Shown):
     @cached_property
     def _predicted(self) -> dict[bytes, Estimate]:
         return {}
+
+
+def can_be_multiplied(basis: Basis) -> bool:
+    """Return whether the renderer of light groups multiplies lights in other primaries than
+    Rec.709.
+    """
+    return bool(basis.origin.primaries) and any(light.plugin == REST for light in basis.lights)
+
+
+def channel_responses(basis: Basis) -> Planes:
+    """Return planes that say what a change of a single channel changes in this channel; of the
+    lights that stay those as they are. See `as_multiplied`.
+    """
+    adjusted = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
+    planes = {k: response_in(basis.origin.primaries, basis.planes.plane(k)) for k in adjusted}
+    return basis.planes.replaced(planes)
+
+
+def as_multiplied(basis: Basis, weights: Doubles, planes: Planes | None = None) -> Basis:
+    """Return a basis whose planes add up to the `mix` of another at some weights, (n, 3): what
+    multiplying in the renderer's primaries changes there is in the lights and, where they are off,
+    in the `rest`. Its current look stays.
+
+    planes: of the lights, such as `channel_responses`, by default their pictures at `weights`.
+    """
+    planes = _planes_at(basis, weights) if planes is None else planes
+    rest = next(k for k, light in enumerate(basis.lights) if light.plugin == REST)
+    change = basis.mix(weights) - planes.mix(weights)
+    return replace(
+        basis,
+        planes=planes.replaced({rest: planes.plane(rest) + change}),
+        origin=replace(basis.origin, primaries=()),
+        former=Estimate(basis.current_look, basis.current_noise),
+    )
+
+
+def _planes_at(basis: Basis, weights: Doubles) -> Planes:
+    """Return planes that add up to what the renderer shows of each light at weights (n, 3)."""
+    primaries, planes = basis.origin.primaries, basis.planes
+    adjusted = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
+    return planes.replaced(
+        {k: picture_at(primaries, planes.plane(k), weights[k]) for k in adjusted}
+    )
 
 
 def meter_exposure(image: Floats, *bases: Basis) -> float:

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis import can_be_multiplied, channel_responses
+from lightpaint.lighting.problem import problem_as_multiplied
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
 
@@ -37,13 +39,15 @@ def answer_as_multiplied(
     finish: what is done to each answer once it is solved.
     """
     problem, w = solution.problem, solution.weights
-    if not all(basis.can_be_multiplied for basis in problem.views.bases):
+    if not all(can_be_multiplied(basis) for basis in problem.views.bases):
         return solution
-    planes = [basis.channel_responses() for basis in problem.views.bases]
+    planes = [channel_responses(basis) for basis in problem.views.bases]
     iteration = _Anderson(np.sqrt(problem.power))
     best, least = solution, np.inf
     for _ in range(MAX_SOLVES):
-        solution = finish(solution_of(problem.as_multiplied(w, planes), start=solution.weights))
+        solution = finish(
+            solution_of(problem_as_multiplied(problem, w, planes), start=solution.weights)
+        )
         found = solution.weights
         rendered = problem.basis.mix(found).astype(np.float64)
         # Where colours clip, views that mix channels have several valleys.
@@ -53,7 +57,7 @@ def answer_as_multiplied(
             best = solution
             break
         w = np.maximum(iteration.next(w, found), 0)
-    shown = problem.as_multiplied(best.weights)
+    shown = problem_as_multiplied(problem, best.weights)
     return replace(
         best, problem=replace(best.problem, basis=shown.basis, views=shown.views, given=shown.given)
     )

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis import Basis, Lights, Planes
+from lightpaint.basis import Basis, Lights, Planes, as_multiplied
 from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
@@ -303,37 +303,6 @@ class Problem(linear_problem.LinearProblem):
         equations = NormalEquations.of(self.basis, squares.image, squares.weight)
         return replace(self, views=views, squares=squares, loss=loss, equations=equations)
 
-    def as_multiplied(self, weights: Doubles, planes: Sequence[Planes] | None = None) -> "Problem":
-        """Return this problem, before a solve, on planes that add up to the render at weights (n,
-        3); see `Basis.as_multiplied`. planes: of each view.
-        """
-        bases = self.views.bases
-        of_views = [None] * len(bases) if planes is None else planes
-        multiplied = [x.as_multiplied(weights, y) for x, y in zip(bases, of_views, strict=True)]
-        return replace(self._with_bases(multiplied), given=bases)
-
-    def as_given(self) -> "Problem":
-        """Return this problem before `as_multiplied`, and before a solve."""
-        return replace(self._with_bases(self.given), given=()) if self.given else self
-
-    def _with_bases(self, bases: Sequence[Basis]) -> "Problem":
-        """Return the same demands on other planes of the same lights. bases: of each view."""
-        whole, parts = joint_basis(bases)
-        views = Views(parts, self.views.targets)
-        squares, loss = _losses(views, whole, self.fit)
-        equations = NormalEquations.of(whole, squares.image, squares.weight)
-        return replace(
-            self,
-            basis=whole,
-            views=views,
-            squares=squares,
-            loss=loss,
-            equations=equations,
-            reduction=self.full,
-            corrected=None,
-            noise_removed=0.0,
-        )
-
     def view_problem(self, k: int) -> "Problem":
         """Return the problem of view k alone: its pixels of the same squares."""
         if len(self.views) == 1:
@@ -352,6 +321,42 @@ class Problem(linear_problem.LinearProblem):
             equations=NormalEquations.of(basis, squares.image, squares.weight),
             corrected=None,
         )
+
+
+def problem_as_multiplied(
+    problem: Problem, weights: Doubles, planes: Sequence[Planes] | None = None
+) -> Problem:
+    """Return a problem, before a solve, on planes that add up to the render at weights (n, 3); see
+    `basis.as_multiplied`. planes: of each view.
+    """
+    bases = problem.views.bases
+    of_views = [None] * len(bases) if planes is None else planes
+    multiplied = [as_multiplied(x, weights, y) for x, y in zip(bases, of_views, strict=True)]
+    return replace(_with_bases(problem, multiplied), given=bases)
+
+
+def problem_as_given(problem: Problem) -> Problem:
+    """Return a problem before `problem_as_multiplied`, and before a solve."""
+    return replace(_with_bases(problem, problem.given), given=()) if problem.given else problem
+
+
+def _with_bases(problem: Problem, bases: Sequence[Basis]) -> Problem:
+    """Return the same demands on other planes of the same lights. bases: of each view."""
+    whole, parts = joint_basis(bases)
+    views = Views(parts, problem.views.targets)
+    squares, loss = _losses(views, whole, problem.fit)
+    equations = NormalEquations.of(whole, squares.image, squares.weight)
+    return replace(
+        problem,
+        basis=whole,
+        views=views,
+        squares=squares,
+        loss=loss,
+        equations=equations,
+        reduction=problem.full,
+        corrected=None,
+        noise_removed=0.0,
+    )
 
 
 def _losses(views: Views, whole: Basis, fit: Fit) -> tuple[Squares, Loss]:

@@ -16,7 +16,12 @@ from lightpaint.lighting.analysis.appearance.display_difference import PaintComp
 from lightpaint.lighting.linear_problem import LinearProblem
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, are_sketches, display_transform
+from lightpaint.lighting.problem import (
+    Problem,
+    are_sketches,
+    display_transform,
+    problem_as_given,
+)
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
 
@@ -60,7 +65,7 @@ def hold_to_current(
 
     finish: what is done to each answer once it is solved, as the correction of its noise.
     """
-    problem = solution.problem.as_given()
+    problem = problem_as_given(solution.problem)
     is_sketch = are_sketches(problem.views)
     if not problem.fit.reads_wishes(is_sketch=is_sketch) or problem.constraints.sparse is not None:
         return solution

@@ -501,6 +501,7 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
     return np.asarray(np.maximum(solved - low, high - solved) > solved)
 
 
+@keywords()
 def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
     """Return `solution` with the standard errors of lights and objective, if known.
 
