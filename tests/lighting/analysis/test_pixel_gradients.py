@@ -179,6 +179,20 @@ def test_bands_have_the_gradients_of_whole_pictures(
         np.testing.assert_allclose(banded, expected, rtol=1e-10, atol=1e-13)
 
 
+def test_each_of_several_views_has_its_own_gradients(make_basis: Any):
+    """The same view twice: the gradients of each are equal."""
+    images, halves = _noisy(_pools(), 0.3, 1)
+    basis = make_basis(images=images, half_differences=halves)
+    targets = [_painting(_pools())] * 2
+    solution = solve([basis, basis], targets, literal=True, space="display")
+    found = PixelGradients.of(solution, Residuals.of(solution))
+    for gradients in (found.mean, found.half, found.bend, found.doubt):
+        assert gradients is not None
+        first, second, _ = np.split(gradients, [SIZE[0] * SIZE[1], 2 * SIZE[0] * SIZE[1]])
+        assert first.any()
+        np.testing.assert_allclose(second, first, rtol=1e-10, atol=1e-13)
+
+
 def test_no_tangent_leads_across_the_edge_of_clipping(make_basis: Any):
     """A pixel that is clipped for sure, beside noisy ones below white: its loss has no slope."""
     rng = np.random.default_rng(2)

@@ -252,7 +252,8 @@ class PixelGradients:
                 (everywhere.subset(band.own).guide, counted[band.own]) for band in bands
             )
             for band in bands:
-                pixels = everywhere if len(bands) == 1 else everywhere.subset(band.own)
+                is_whole = band.own == slice(0, len(everywhere))
+                pixels = everywhere if is_whole else everywhere.subset(band.own)
                 guide = everywhere.subset(band.around).guide
                 own_light = band.steadied(*light, counted, guide, dark)
                 own_look = None if look is None else band.steadied(*look, counted)
