@@ -252,7 +252,7 @@ class PixelGradients:
                 (everywhere.subset(band.own).guide, counted[band.own]) for band in bands
             )
             for band in bands:
-                is_whole = band.own == slice(0, len(everywhere))
+                is_whole = band.own == slice(0, len(everywhere))  # lit strips end with padding
                 pixels = everywhere if is_whole else everywhere.subset(band.own)
                 guide = everywhere.subset(band.around).guide
                 own_light = band.steadied(*light, counted, guide, dark)
