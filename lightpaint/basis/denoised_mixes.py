@@ -27,6 +27,7 @@ from lightpaint.images import (
     block_mean,
     box_mean,
     denoised,
+    enlarged,
     oidn_is_installed,
     shifted,
 )
@@ -165,9 +166,13 @@ def _can_read(basis: Basis) -> bool:
 
 
 def _on_pixels(blocks: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return the values of blocks of `READ_SIDE` on all pixels of a picture, (h, w, 3)."""
-    whole = blocks.repeat(READ_SIDE, axis=0).repeat(READ_SIDE, axis=1)
-    return whole[: shape[0], : shape[1]]
+    """Return the values of blocks of `READ_SIDE` on all pixels of a picture, (h, w, 3).
+
+    Pixels at the right and at the bottom that fill no block have the value beside them.
+    """
+    whole = enlarged(blocks, READ_SIDE)
+    rest = [(0, side - known) for side, known in zip(shape[:2], whole.shape[:2], strict=True)]
+    return np.pad(whole, [*rest, (0, 0)], mode="edge")
 
 
 def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: MixQuality = "fast") -> Floats:

@@ -330,6 +330,23 @@ def test_the_look_that_is_read_has_little_noise_in_blocks_and_keeps_single_pixel
     assert 0.5 < stated / error < 1.5
 
 
+@pytest.mark.parametrize("size", [(47, 64), (48, 63), (25, 45)])
+def test_the_look_of_a_picture_with_odd_sides_is_read(
+    size: tuple[int, int], rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    """Pixels at the end that fill no block change as those beside them."""
+    monkeypatch.setitem(globals(), "SIZE", size)
+    basis = replace(split_basis(*pools_and_glow(), rng), features=wall())
+    look, noise = read_look(basis), read_look_noise(basis)
+    assert look.shape == noise.shape == (*size, 3)
+    change = look - basis.current_look
+    assert np.abs(change).max() > 0.01
+    if size[0] % READ_SIDE:
+        np.testing.assert_allclose(change[-1], change[-2], atol=1e-6)
+    if size[1] % READ_SIDE:
+        np.testing.assert_allclose(change[:, -1], change[:, -2], atol=1e-6)
+
+
 def test_without_known_parts_the_look_is_read_as_it_is(rng: np.random.Generator):
     pools, glow = pools_and_glow()
     split = split_basis(pools, glow, rng)
