@@ -15,6 +15,7 @@ from lightpaint.basis import (
     denoise_current_look,
     denoise_to_halves,
     read_denoised_planes,
+    read_look,
 )
 from lightpaint.basis.cache import keep_opening
 from lightpaint.files import one_line
@@ -221,6 +222,8 @@ class SessionBases:
         current_looks = self._denoiser.load_cached(bases)
         clean_planes = self._denoiser.planes_for(bases)
         small_planes = self._denoiser.small_planes_for(bases)
+        for basis in bases:
+            read_look(basis)  # made once, and takes longer than strokes should wait for the lock
         with self._access.lock:
             if not self._publisher.is_open:
                 raise StoppedError
