@@ -11,6 +11,7 @@ from lightpaint.basis.cache.denoised_planes import RoughPlanes
 from lightpaint.basis.denoised_mixes import (
     READ_SIDE,
     blend_by_noise,
+    blend_where_sure,
     denoise_mix,
     denoise_plane,
     read_look,
@@ -202,6 +203,20 @@ def test_coarse_pictures_are_nearly_as_close(rng: np.random.Generator):
     )
     assert coarse < 1.5 * fast
     assert coarse < 0.05 * np.square(raw - truth).mean()
+
+
+def test_sure_blends_leave_no_specks_of_grain(rng: np.random.Generator):
+    """Where nothing is lost, hardly a window of noise looks as if; lost edges come back."""
+    truth = np.full((96, 96, 3), 2, np.float32)
+    truth[:, 60:] = 12
+    a, b = (truth + rng.exponential(size=truth.shape).astype(np.float32) - 1 for _ in range(2))
+    raw, half, clean = (a + b) / 2, (a - b) / 2, np.full_like(truth, 2)
+    change = np.abs(blend_where_sure(raw, half, clean) - clean).mean(axis=-1)[:, :56]
+    plain = np.abs(blend_by_noise(raw, half, clean) - clean).mean(axis=-1)[:, :56]
+    assert np.quantile(change, 0.99) < 0.2 * np.quantile(plain, 0.99)
+    beyond = blend_where_sure(raw, half, clean)[:, 66:]
+    # t = V / (V + B) = 0.5 / 100.5 of the change by 10, and the noise of the raw picture.
+    assert np.abs(beyond.mean() - 12) < 0.15
 
 
 @pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
