@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from lightpaint.images.estimate import (
         HALF_DIFFERENCE, Estimate, box_mean, read_estimate, shifted, write_estimate,
     )
-    from lightpaint.images.neighbourhoods import dilated, gaussian_mean, grown, number_parts
+    from lightpaint.images.neighbourhoods import (
+        TAP, dilated, film_filtered, gaussian_mean, grown, number_parts,
+    )
     from lightpaint.images.object_map import BACKGROUND, Objects
     from lightpaint.images.packed_picture import PackedPicture, pack_picture
     from lightpaint.images.picture import (

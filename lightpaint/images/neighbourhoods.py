@@ -1,15 +1,22 @@
-"""Pixels and their neighbours: soft averages, masks that grow, and connected parts of masks.
+"""Pixels and their neighbours: soft averages, a film's filter, masks that grow, connected parts.
 
 SciPy's `ndimage` has these, too, but takes a quarter of a second to import, and nothing else in an
 ordinary solve needs SciPy.
 """
 
+import math
+
 import numpy as np
 
-from lightpaint.arrays import Bools, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 
 #: Standard deviations after which a Gaussian ends.
 TRUNCATED = 4.0
+
+#: Share of the reconstruction filter of Mitsuba's films, a Gaussian whose standard deviation is
+#: half a pixel, that lies in each of both neighbours along an axis: beyond one standard
+#: deviation.
+TAP = (1 - math.erf(math.sqrt(0.5))) / 2
 
 
 def gaussian_mean(values: Floats, radius: float) -> Floats:
@@ -31,6 +38,15 @@ def gaussian_mean(values: Floats, radius: float) -> Floats:
             mean += kernel[k] * (before + after)
         result = np.moveaxis(mean, 0, axis)
     return np.ascontiguousarray(result, values.dtype)
+
+
+def film_filtered(image: Doubles) -> Doubles:
+    """Return a picture that has a box filter, (h, w, …), with the Gaussian of Mitsuba's films."""
+    for axis in (0, 1):
+        lines = np.moveaxis(image, axis, 0)
+        wide = np.concatenate([lines[:1], lines, lines[-1:]])
+        image = np.moveaxis((1 - 2 * TAP) * lines + TAP * (wide[:-2] + wide[2:]), 0, axis)
+    return image
 
 
 def grown(mask: Bools) -> Bools:

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
         KEYS_BY_KIND, start_weights, tables_by_light, tied_lights,
     )
     from lightpaint.lighting.constraints.values import check_keys
-    from lightpaint.lighting.default_solve import default_answer, solve
+    from lightpaint.lighting.default_solve import answer_as_multiplied, default_answer, solve
     from lightpaint.lighting.fit import (
         DEFAULT_HOLD, Colors, Emitters, Fit, Space, resolve_fit, resolve_for_targets,
     )
@@ -72,7 +72,6 @@ if TYPE_CHECKING:
     from lightpaint.lighting.live.live_solver import LiveSolver
     from lightpaint.lighting.live.live_view import LiveView
     from lightpaint.lighting.loss.painting import ignored_paint, resolve_importance
-    from lightpaint.lighting.multiplied_answer import answer_as_multiplied
     from lightpaint.lighting.normal_equations import NormalEquations
     from lightpaint.lighting.problem import Problem
     from lightpaint.lighting.solution import Solution

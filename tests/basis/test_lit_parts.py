@@ -12,10 +12,10 @@ import lightpaint as lp
 from lightpaint.arrays import round_to_halves
 from lightpaint.basis.file import basis_file, file_parts, lit_planes
 from lightpaint.basis.file.basis_file import FORMAT_KEY, LIT_FORMAT, as_stored, is_file_of
+from lightpaint.basis.file.file_parts import MAX_STEP, lit_channels, read_lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import TILE
 from lightpaint.basis.file.light_channels import PREFIXES, STEP, noise_numbers
-from lightpaint.basis.file.lit_parts import MAX_STEP, lit_channels, read_lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import (
     HIDDEN_SHARE,

@@ -21,11 +21,14 @@ from lightpaint.basis.file.file_parts import (
     LIGHT_KEY,
     Checksums,
     all_channels,
+    as_encoded_plane,
+    as_lit_plane,
     check,
     checked_text,
     checksum,
     fields_of_others,
     light_texts,
+    lit_channels,
     other_parts,
     picture_size,
     plane_sets,
@@ -42,7 +45,6 @@ from lightpaint.basis.file.light_channels import (
     has_indirect_channels,
     is_lit_part,
 )
-from lightpaint.basis.file.lit_parts import as_encoded_plane, as_lit_plane, lit_channels
 from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import MANY_LIGHTS
 from lightpaint.basis.light_basis import Basis, Origin

@@ -1,5 +1,5 @@
 """The channels of the part of a light in a basis file, of all pixels or of its lit pixels; and rows
-of the latter (see lit_parts.py).
+of the latter (see file_parts.py).
 """
 
 from collections.abc import Collection

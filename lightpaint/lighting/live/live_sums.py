@@ -10,7 +10,6 @@ from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.basis import Basis, Planes, array_name, array_once, multipliers_in, read_look
 from lightpaint.colour import ViewTransform, from_rec709, to_rec709
 from lightpaint.images import block_mean, block_sums, enlarged
-from lightpaint.lighting.live.step_search import search_step
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import (
     ON_EMITTERS,
@@ -24,7 +23,7 @@ from lightpaint.lighting.loss.expected_lights import (
 )
 from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.pixel_loss import STRIP_PIXELS
-from lightpaint.lighting.loss.reweighting import interpolate
+from lightpaint.lighting.loss.reweighting import interpolate, search_step
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target import Wish, extend_marked
 from lightpaint.threads import one_thread, parallel_map

@@ -19,9 +19,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.lighting.constraints.constraint_table import Requirements
-from lightpaint.lighting.live.step_search import search_step
 from lightpaint.lighting.loss.painting_loss import PaintedPixels
-from lightpaint.lighting.loss.reweighting import interpolate
+from lightpaint.lighting.loss.reweighting import interpolate, search_step
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lightpaint.arrays import Doubles
+from lightpaint.images.neighbourhoods import film_filtered
 from lightpaint.lighting.analysis.noise.noise_of_sums import covariance_of_sums
-from lightpaint.lighting.analysis.noise.reconstruction_filter import filtered
 
 SIZE, SEEDS = (48, 64), 60
 TOLERANCE = 4 * np.sqrt(2 / (10 * SEEDS))
@@ -30,7 +30,7 @@ def paintings(*, is_filtered: bool) -> list[Doubles]:
         rng = np.random.default_rng(seed)
         of_path, of_channels = rng.normal(size=(1, *SIZE)), rng.normal(size=(3, *SIZE))
         noise = DEVIATION * (of_path + 0.1 * of_channels)
-        noises.append(np.stack([filtered(x) for x in noise]) if is_filtered else noise)
+        noises.append(np.stack([film_filtered(x) for x in noise]) if is_filtered else noise)
     return noises
 
 
@@ -39,7 +39,7 @@ def test_the_variance_by_one_painting_is_that_of_its_noise(is_filtered: bool) ->
     """In closed form, where the pixels that count most are noisiest: a mean over a block would be
     far less."""
     # A filter of the noise is one of the factors.
-    seen = [[filtered(x) for x in its] for its in FACTORS] if is_filtered else FACTORS
+    seen = [[film_filtered(x) for x in its] for its in FACTORS] if is_filtered else FACTORS
     missed = 0.3 * np.cos(X / 20 + Y / 30)  # smooth, as what lights cannot make
     found = np.mean(
         [

@@ -9,7 +9,7 @@ from renderer import LIGHTS, write_room
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.noise.reconstruction_filter import TAP, filtered
+from lightpaint.images.neighbourhoods import TAP, film_filtered
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZE = (48, 64)
@@ -32,10 +32,10 @@ def test_a_box_becomes_a_gaussian() -> None:
     image = np.zeros((5, 5))
     image[2, 2] = 1
     line = np.array([0, TAP, 1 - 2 * TAP, TAP, 0])
-    np.testing.assert_allclose(filtered(image), np.outer(line, line), atol=1e-15)
+    np.testing.assert_allclose(film_filtered(image), np.outer(line, line), atol=1e-15)
     assert pytest.approx(sums_over_subpixels(), abs=1e-4) == TAP  # 2 pixels hold all but 6e-5
     # At the border as if it went on.
-    np.testing.assert_allclose(filtered(np.ones((3, 1))), 1, atol=1e-15)
+    np.testing.assert_allclose(film_filtered(np.ones((3, 1))), 1, atol=1e-15)
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_an_answer_allows_for_the_filter_of_a_painting(
     """Without it the lamp in view and its halo make lights wrong, as least squares of the picture
     with that filter are."""
     clean = picture()
-    image = filtered(clean) if sigma is None else gaussian_filter(clean, (sigma, sigma, 0))
+    image = film_filtered(clean) if sigma is None else gaussian_filter(clean, (sigma, sigma, 0))
     walls = [np.where(LAMP, 12, WALLS[0]), WALLS[1]]
     columns = np.stack([x.ravel() for x in walls], axis=1)
     wrong = np.linalg.lstsq(columns, image.reshape(-1, 3), rcond=None)[0]
@@ -90,7 +90,7 @@ def test_an_answer_allows_for_the_filter_of_a_painting(
 
 def test_views_lose_their_filter_each_by_itself(basis: lp.Basis) -> None:
     """Also in display values, where light is compared as it is shown."""
-    image = filtered(picture())
+    image = film_filtered(picture())
     target = lp.Target.of(image.astype(np.float32))
     for space in ("linear", "display"):
         answer = lp.solve([basis, basis], [target, target], literal=True, space=space)
@@ -112,7 +112,7 @@ def test_a_filter_is_seen_in_eight_bits(make_basis: Any, is_filtered: bool) -> N
     emission = (TRUE / [[1.6], [0.7]]).tolist()
     basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2, emission=emission)
     clean = np.einsum("nhw,nc->hwc", walls, TRUE)
-    image = filtered(clean) if is_filtered else clean
+    image = film_filtered(clean) if is_filtered else clean
     image = image * (1 + 0.03 * np.random.default_rng(2).normal(size=(*SIZE, 1)))
     view = lp.ViewTransform("srgb")
     codes = np.round(255 * np.clip(view.encode(image), 0, 1))

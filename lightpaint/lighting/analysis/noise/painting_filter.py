@@ -29,8 +29,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis import as_slice, block_of
 from lightpaint.lighting.analysis.noise.painting_noise import painting_grain
-from lightpaint.lighting.analysis.noise.reconstruction_filter import added_by_filter
-from lightpaint.lighting.analysis.noise.residuals import Residuals
+from lightpaint.lighting.analysis.noise.residuals import Residuals, added_by_filter
 from lightpaint.lighting.analysis.noise.weight_directions import solve_for
 from lightpaint.lighting.problem import Problem, ViewsReading
 from lightpaint.lighting.solution import Solution

@@ -31,8 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.images import bands_of, box_mean, enlarged
-from lightpaint.lighting.analysis.noise.reconstruction_filter import added_by_filter
+from lightpaint.images import bands_of, box_mean, enlarged, film_filtered
 from lightpaint.lighting.loss.pixel_loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution
 
@@ -528,3 +527,10 @@ def _sum_beside(image: Doubles, radius: int) -> Doubles:
     for k in range(1, 2 * radius + 1):
         sums += rows[:, k : k + width]
     return sums
+
+
+def added_by_filter(solution: Solution, image: Floats) -> Doubles:
+    """Return what the filter of Mitsuba's films adds to a picture of all views, (p, 3)."""
+    views, size = solution.problem.views, solution.importance.shape
+    parts = [views.part(image.reshape(*size, 3), k).astype(np.float64) for k in range(len(views))]
+    return np.asarray(views.join([film_filtered(x) - x for x in parts]).reshape(-1, 3))
