@@ -154,19 +154,26 @@ def test_peaks_by_hand():
     # As if the pixels came in blocks: what was a peak of the first is none of all.
     peaks = Peaks.empty(1)
     for part in np.array_split(np.arange(101), 4):
-        peaks.add(possible[:, part], push[:, part])
+        peaks.add(possible[:, part], push[:, part], push[:, part])
     # Half of 200: it says nothing, the others 0.01 each, and it may be twice as noisy.
     assert peaks.total[0] == pytest.approx(200)
     assert peaks.hidden()[0] == pytest.approx(4 * 0.01 * 100)
     # It says 0.04 of itself, and alone it may be 42 times that: more than two paths have.
     push[0, 50] = 2
     peaks = Peaks.empty(1)
-    peaks.add(possible, push)
+    peaks.add(possible, push, push)
     assert 0.04 * T_RATIOS[0] ** 2 > TWO_PATHS
     assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100 - 4)
+    # By the light of the pixel beside it pushes nothing, but its halves differ by a fifth of it.
+    push[0, 50], shown = 0, push.copy()
+    shown[0, 50] = 2
+    peaks = Peaks.empty(1)
+    peaks.add(possible, push, shown)
+    assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100)
     # Of many alike none decides.
     peaks = Peaks.empty(1)
-    peaks.add(np.ones((1, int(1 / PEAK_SHARE) + 1)), np.full((1, int(1 / PEAK_SHARE) + 1), 0.1))
+    few = int(1 / PEAK_SHARE) + 1
+    peaks.add(np.ones((1, few)), *np.full((2, 1, few), 0.1))
     assert peaks.hidden()[0] == 0
 
 

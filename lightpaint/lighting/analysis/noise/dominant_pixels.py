@@ -36,20 +36,23 @@ class Peaks:
     """The pixels that could push one light most, collected block by block; of one channel.
 
     total, pushed: (n,), sums of u² and z² so far; u is the push of a pixel if all of it were noise,
-    z the push by its half difference. candidates: lights, u² and z² of single pixels.
+    z the push by its half difference. candidates: lights, u², z² and v² of single pixels; v is the
+    share of u by which the halves of the pixel differ, whatever the pixel beside shows.
     """
 
     total: Doubles
     pushed: Doubles
-    candidates: list[tuple[npt.NDArray[np.intp], Doubles, Doubles]] = field(default_factory=list)
+    candidates: list[tuple[npt.NDArray[np.intp], Doubles, Doubles, Doubles]] = field(
+        default_factory=list
+    )
 
     @classmethod
     def empty(cls, n: int) -> "Peaks":
         """Return the state before the first block."""
         return cls(np.zeros(n), np.zeros(n))
 
-    def add(self, could: Doubles, push: Doubles, *, first: int = 0) -> None:
-        """Add a block of some lights from `first` on: u and z, (lights, pixels) each."""
+    def add(self, could: Doubles, push: Doubles, shown: Doubles, *, first: int = 0) -> None:
+        """Add a block of some lights from `first` on: u, z and v, (lights, pixels) each."""
         lights = slice(first, first + len(could))
         u2 = np.square(could)
         self.total[lights] += u2.sum(axis=1)
@@ -57,17 +60,18 @@ class Peaks:
         # Totals only grow: a pixel that is small by now stays small.
         light, pixel = np.nonzero(u2 > PEAK_SHARE * self.total[lights, None])
         if light.size:
-            numbers = u2[light, pixel], np.square(push[light, pixel])
-            self.candidates.append((light + first, *numbers))
+            z2, v2 = (np.square(x[light, pixel]) for x in (push, shown))
+            self.candidates.append((light + first, u2[light, pixel], z2, v2))
 
     def add_entries(
         self,
         lights: Indices,
         could: Doubles,
         push: Doubles,
+        shown: Doubles,
         of_lights: Callable[[Doubles], Doubles],
     ) -> None:
-        """Add a block by its lit pixels: their lights, u and z, (m,) each.
+        """Add a block by its lit pixels: their lights, u, z and v, (m,) each.
 
         of_lights: returns the sum of values, (m,), of each light, (n,).
         """
@@ -76,7 +80,7 @@ class Peaks:
         self.pushed += of_lights(z2)
         large = np.flatnonzero(u2 > PEAK_SHARE * self.total[lights])
         if large.size:
-            self.candidates.append((lights[large], u2[large], z2[large]))
+            self.candidates.append((lights[large], u2[large], z2[large], np.square(shown[large])))
 
     def merge(self, more: "Peaks") -> None:
         """Include the pixels that others collected."""
@@ -93,7 +97,7 @@ class Peaks:
         hidden = np.zeros(self.total.size)
         if not self.candidates:
             return hidden
-        lights, u2, z2 = (np.concatenate(x) for x in zip(*self.candidates, strict=True))
+        lights, u2, z2, v2 = (np.concatenate(x) for x in zip(*self.candidates, strict=True))
         is_peak = u2 > PEAK_SHARE * self.total[lights]
         for k in np.unique(lights[is_peak]):
             own_peaks = is_peak & (lights == k)
@@ -103,7 +107,8 @@ class Peaks:
                 float(self.pushed[k] - observed) / rest if rest > 1e-9 * could else 0.0
             )
             wider = t_ratios(could**2 / np.square(u2[own_peaks]).sum())
-            variance = max(observed / could * float(wider) ** 2, MAX_UNLIKE * share_of_others)
+            seen = max(observed, float(v2[own_peaks].sum()))
+            variance = max(seen / could * float(wider) ** 2, MAX_UNLIKE * share_of_others)
             hidden[k] = max(min(variance, TWO_PATHS) * could - observed, 0)
         return hidden
 

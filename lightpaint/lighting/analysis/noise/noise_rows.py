@@ -221,7 +221,8 @@ def dense_rows(
             sums.light[c, some] += weighed.sum(axis=1)
             sums.light_squares[c, some] += np.einsum("ip,ip->i", weighed, weighed)
             size = pixels.missing + pixels.weights[some, None] * own_light
-            sums.peaks[c].add(weighed * size, row, first=first)
+            shown = pixels.D * half * size
+            sums.peaks[c].add(weighed * size, row, shown, first=first)
         if pixels.has_pull:
             power = factor(own_light, half, pixels.own_share_of_pull) * half
             row += pixels.pulled[some, None] * np.where(pixels.unseen, power, 0)
@@ -310,8 +311,9 @@ class LitPairs:
             weighed = pixels.D[at] * light
             sums.light[c] += self._of_lights(weighed)
             sums.light_squares[c] += self._of_lights(np.square(weighed))
-            could = weighed * (pixels.missing[at] + pixels.weights[of] * light)
-            sums.peaks[c].add_entries(of, could, row, self._of_lights)
+            size = pixels.missing[at] + pixels.weights[of] * light
+            shown = pixels.D[at] * h * size
+            sums.peaks[c].add_entries(of, weighed * size, row, shown, self._of_lights)
         if pixels.has_pull:
             power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
             row += pixels.pulled[of] * pixels.unseen[at] * power

@@ -93,6 +93,9 @@ NEAR_SIDES = [
     for x in FAR_SIDES
 ]
 
+#: Share of the noise from which an answer without it scatters as one without any.
+NEARLY_ALL = 7 / 8
+
 #: The least share of a light within what M determines, if no other lights replace it exactly.
 OWN = 1 - 1e-6
 
@@ -357,16 +360,21 @@ def error_bars(
     unbiased = step.equations(denoised_matrix(problem.equations, noise.power))
     bias = np.asarray(solve_for(solution, unbiased) - weights)
 
-    # Curvature without bias. A render of the mix shows all of an earlier error, of which a step by
-    # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
-    # of its own M.
-    scatters = problem.solved if problem.refinement is None else unbiased
-    response = WeightResponse(solution, scatters, unbiased, weights + bias)
-    spread = response.spread(noise.full_covariance)
-    by_painting, wide_by_painting, moved = np.zeros((3, *weights.shape))
-    if with_painting:
-        by_painting, wide_by_painting = _scatter_by_painting(solution, response)
-    del response  # of many lights it is large
+    # A step from a render of the mix has the unbiased M.
+    is_unbiased = problem.refinement is not None or problem.noise_removed >= NEARLY_ALL
+    covariance, center = noise.full_covariance, weights + bias
+    painted = _painting_covariance(solution) if with_painting else None
+    spreads = []
+    for scatters in [unbiased] if is_unbiased else [problem.solved, unbiased]:
+        response = WeightResponse(solution, scatters, unbiased, center)
+        painting = np.zeros_like(weights) if painted is None else response.spread(painted[0]).inside
+        spreads.append((response.spread(covariance), painting))
+        del response  # of many lights it is large
+    # The interval is around the answer without bias, which scatters by its own M.
+    (spread, by_painting), (of_interval, wide_by_painting) = spreads[0], spreads[-1]
+    if painted is not None:
+        wide_by_painting = wide_by_painting * t_ratios(painted[1])
+    moved = np.zeros_like(weights)
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
@@ -382,14 +390,16 @@ def error_bars(
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
         far = solve_for(solution, weak_equations)
         response = WeightResponse(solution, weak_equations, weak_equations, far)
-        spread = spread.mixed_with(response.spread(noise.full_covariance), doubts)
-        moved = far - weights - bias
+        weak_spread = response.spread(covariance)
+        spread, of_interval = (x.mixed_with(weak_spread, doubts) for x in (spread, of_interval))
+        moved = far - center
     by_poses, reading = _scatter_by_poses(solution, level_errors), ReadingNoise.of(solution)
     sides, wide = [], []
-    for exit_, beyond in zip(spread.exits, (reading.below, reading.above), strict=True):
-        common = exit_, beyond, unsteady, moved, by_poses
-        sides.append(_root(spread.inside, reading.scatter, *common))
-        known = _root(spread.inside * noise.widening, wide_by_painting, *common)
+    beyond = reading.below, reading.above
+    for exit_, far_exit, more in zip(spread.exits, of_interval.exits, beyond, strict=True):
+        common = more, unsteady, moved, by_poses
+        sides.append(_root(spread.inside, reading.scatter, exit_, *common))
+        known = _root(of_interval.inside * noise.widening, wide_by_painting, far_exit, *common)
         wide.append(reading.widened(known))
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
@@ -403,23 +413,20 @@ def error_bars(
         noise.objective_noise,
         _excess_by_channel(spread.excess, bias, problem.equations.M),
         solution.norm2,
-        (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | spread.is_far)
+        (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | of_interval.is_far)
         & _is_wide(weights, interval),
         problem.filter_share > 0,
     )
 
 
-def _scatter_by_painting(solution: Solution, response: WeightResponse) -> tuple[Doubles, Doubles]:
-    """Return the standard deviations of the weights by noise of the painting, and the same wider
-    where few pixels tell them, (n, 3) each.
+def _painting_covariance(solution: Solution) -> tuple[Doubles, Doubles] | None:
+    """Return the covariance of the gradient by noise of the painting, (3, n, 3, n), and its degrees
+    of freedom, (n, 3); None where there is next to none.
     """
     found = PaintingNoise.of(solution).covariance()
-    if found is None:
-        return (np.zeros_like(solution.weights),) * 2
-    covariance, freedom = found
-    covariance *= 1 + solution.problem.filter_share * (CORRELATION - 1)
-    inside = response.spread(covariance).inside
-    return inside, inside * t_ratios(freedom)
+    if found is not None:
+        found[0][...] *= 1 + solution.problem.filter_share * (CORRELATION - 1)
+    return found
 
 
 def _scatter_by_poses(solution: Solution, level_errors: Sequence[tuple[str, RGB]]) -> Doubles:
