@@ -77,10 +77,15 @@ def test_the_command_of_a_session_moves_no_light_by_itself(
     assert "--no-move" in words
     completed = run(work_folder, *words, "--no-verify", "-o", "still")
     assert completed.returncode == 0, completed.stderr
-    assert "move" not in completed.stdout + completed.stderr
+    printed = completed.stdout + completed.stderr
+    assert not any(done in printed for done in ("turned by", "slid by"))
+    still = (work_folder / "still" / "lighting.json").read_text(encoding="utf-8")
+    assert "moved_from" not in still
     searched = run(work_folder, *(x for x in words if x != "--no-move"), "-o", "searched")
     assert searched.returncode == 0, searched.stderr
     assert "turned by" in searched.stdout + searched.stderr
+    found = (work_folder / "searched" / "lighting.json").read_text(encoding="utf-8")
+    assert "moved_from" in found
     placed = subject.command(
         {"": "p.exr"}, SessionRequests().with_poses({"bulb": {"position": POSITION}})
     )
