@@ -108,13 +108,13 @@ def test_a_painting_over_the_beauty_is_known_as_such(
 ):
     """It was read as sRGB, and all of it counted: `3.6 (3.4 as the scene is now)`."""
     save(tmp_path / "warm.png", brighten_key(shot), view)
-    completed = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "3")
+    completed = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "1")
     assert completed.returncode == 0, completed.stderr
     assert f"what differs from the look of shot.exr through {view.spoken}" in completed.stderr
     report = json.loads((tmp_path / "warm" / "report.json").read_text())
     assert report["view"]["name"] == view.name
     assert report["painting"]["importance_mean"] < 0.5
-    assert report["seen"]["delta_e"] < 0.8 * report["seen"]["asked"]
+    assert report["seen"]["delta_e"] < 0.7 * report["seen"]["asked"]
     assert report["lights"]["key"]["stops"] > 0.3
     # Nobody looks for a look where a view is said, or that all of it counts.
     for option in (("--no-template",), ("--view", "linear", "--exposure", "0")):
