@@ -132,10 +132,10 @@ class Problem(linear_problem.LinearProblem):
         tether: A further pull on the weights, to those at other frames of a shot; None without.
         holding: The pull to the current lights that holds an answer which would lead away from the
             paint; None without.
-        given: The bases of the views of light groups whose renderer multiplies in other primaries,
-            where the bases of the problem add up to its picture at one lighting; () for others.
         filter_share: The share of a Gaussian reconstruction filter whose effect was taken out of
             the paintings, which are renders; 0 without one.
+        given: The bases of the views of light groups whose renderer multiplies in other primaries,
+            where the bases of the problem add up to its picture at one lighting; () for others.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)

@@ -321,6 +321,8 @@ class ConstraintsByLight:
             )
             for kind in SINGLE_LIGHT_KINDS
         }
+        # In a basis of spectra, emitters have the pictures: without them there is no lamp.
+        by_kind["emitters"] = tuple(k for k in by_kind["emitters"] if not self.lights[k].lamp)
         by_kind["tie"] = tuple(sorted(tied))
         all_lights = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
         by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()

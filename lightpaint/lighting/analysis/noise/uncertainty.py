@@ -512,7 +512,9 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
 def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
     """Return `solution` with the standard errors of lights and objective, if known.
 
-    uncertainty: its `error_bars`; None if the noise of the basis is unknown.
+    Args:
+        solution: The answer.
+        uncertainty: Its `error_bars`; None if the noise of the basis is unknown.
 
     Examples:
         >>> solution = lp.solve(basis, target)
