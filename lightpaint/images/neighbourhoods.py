@@ -76,7 +76,8 @@ def dilated(mask: Bools, radius: int) -> Bools:
 
 def number_parts(mask: Bools) -> tuple[Indices, int]:
     """Return the number of the connected part to which each pixel belongs, (h, w), 0 for none, and
-    the number of parts, in the order of their first pixels. All eight neighbours are connected.
+    the number of parts, in the order of their first pixels. Pixels are connected by edges alone
+    (4-connectivity): at corners, noise in one pixel would join two parts.
 
     Each pixel points to one before it, at last to the first of its part: parts that touch hook on
     to each other, and pointers jump to the end of their chains (Shiloach and Vishkin 1982).
@@ -86,7 +87,6 @@ def number_parts(mask: Bools) -> tuple[Indices, int]:
     upper, lower, left, right = slice(height - 1), slice(1, None), slice(width - 1), slice(1, None)
     every = slice(None)
     beside = [((every, left), (every, right)), ((upper, every), (lower, every))]
-    beside += [((upper, left), (lower, right)), ((upper, right), (lower, left))]
     edges = [(pixels[a], pixels[b], mask[a] & mask[b]) for a, b in beside]
     first, second = (np.concatenate([x[k][x[2]] for x in edges]) for k in (0, 1))
     root = pixels.ravel().copy()

@@ -41,6 +41,17 @@ def test_a_subject_in_a_repainted_picture_is_a_wish_of_its_own():
     np.testing.assert_allclose(rest.area + found.area, 1)
 
 
+def test_places_that_touch_at_a_corner_are_wishes_of_their_own():
+    """Of both as one, more than half of the painting, none would be a wish."""
+    stops = np.select([box(0, 24, 0, 40), box(24, 40, 40, 60)], [-3.0, 3.0])[..., None]
+    wishes = find_wishes(target((LOOK * 2**stops).astype(np.float32)), LOOK)
+    assert len(wishes) == 3
+    areas = [wish.area > 0 for wish in wishes]
+    for place in (stops[..., 0] < 0, stops[..., 0] > 0):
+        overlap = max((x & place).sum() / (x | place).sum() for x in areas)
+        assert overlap > 0.8  # its border is as soft as the wash
+
+
 def soft(row, column, radius):
     """An ellipse that fades from its centre to its rim, (h, w), from 0 to 1."""
     rows, columns = np.mgrid[: WALL.shape[0], : WALL.shape[1]]
