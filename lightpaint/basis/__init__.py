@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     )
     from lightpaint.basis.denoised_mixes import (
         MixQuality, denoise_current_look, denoise_mix, denoise_mixes, denoise_plane, read_look,
-        read_look_noise,
+        read_look_noise, read_look_side,
     )
     from lightpaint.basis.derived_planes import (
         PlaneReference, block_means, compose_planes, in_one_row,

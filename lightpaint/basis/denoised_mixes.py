@@ -162,6 +162,13 @@ def read_look_noise(basis: Basis) -> Floats:
     return make_once(basis.planes, array_name("read noise", basis.current_weights), make)
 
 
+def read_look_side(basis: Basis) -> int:
+    """Return the side of the squares of pixels of whose mean `read_look` takes noise out; 1 where
+    it takes none.
+    """
+    return READ_SIDE if _can_read(basis) else 1
+
+
 def _can_read(basis: Basis) -> bool:
     """Return whether `read_look` has less noise than the current look."""
     knows_parts = basis.indirect is not None and basis.surfaces(READ_SIDE)[1] is not None

@@ -14,9 +14,16 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis import Basis, Planes, block_means, read_look, read_look_noise
+from lightpaint.basis import (
+    Basis,
+    Planes,
+    block_means,
+    read_look,
+    read_look_noise,
+    read_look_side,
+)
 from lightpaint.colour import luminance
-from lightpaint.images import block_sums
+from lightpaint.images import block_sums, enlarged
 from lightpaint.target import Target, Wish, extend_saturated, number_places, split_wishes
 from lightpaint.threads import one_thread
 
@@ -267,31 +274,39 @@ class NoisyBlocks:
     """The blocks of a view, and the half differences of their light and of the look.
 
     noise: (3, n, p). look_noise, read_noise: (h, w, 3), of the look and of the one that is read.
+    sign_side: side of the squares of blocks that have noise of one sign: it was taken out of their
+    mean in the look that is read, so that what is left of it adds up to little.
     """
 
     blocks: PaintedBlocks
     noise: Floats
     look_noise: Floats
     read_noise: Floats
+    sign_side: int
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> Self:
         """Average a view whose noise is known. target: at the size of the basis."""
         side, counted = _block_side(basis.size), _counted_pixels(basis)
+        look_noise, read_noise = (
+            _weighted_means(x, counted, side) for x in (basis.current_noise, read_look_noise(basis))
+        )
         return cls(
             PaintedBlocks.of(basis, target),
             light_rows(basis.noise, counted, side),
-            *(
-                _weighted_means(x, counted, side)
-                for x in (basis.current_noise, read_look_noise(basis))
-            ),
+            look_noise,
+            read_noise,
+            ceil(read_look_side(basis) / side),
         )
 
     def disturbed(self, rng: np.random.Generator) -> tuple[Wash, Wash]:
-        """Return the wash with more noise, in each block its half difference of either sign, and
-        the same with all signs reversed.
+        """Return the wash with more noise, in each square of blocks their half differences of
+        either sign, and the same with all signs reversed.
         """
-        signs = rng.choice(np.array([-1, 1], np.float32), self.blocks.importance.shape)
+        height, width = self.blocks.importance.shape
+        counts = -(-height // self.sign_side), -(-width // self.sign_side)
+        signs = enlarged(rng.choice(np.array([-1, 1], np.float32), counts), self.sign_side)
+        signs = signs[:height, :width]
         first, second = (
             replace(
                 self.blocks,

@@ -127,6 +127,27 @@ def test_disturbed_blocks_have_the_noise_of_the_basis_twice(make_basis: Any) -> 
     assert np.abs((rows > wash.rows).mean() - 0.5) < 4 * 0.5 / np.sqrt(64 * wash.counts.size)
 
 
+def test_pixels_of_a_square_whose_mean_was_denoised_have_noise_of_one_sign(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the mean would have the noise again that was taken out of it."""
+    target, basis = _sketch(), _noisy_basis(make_basis, 3)
+
+    def signs() -> Any:
+        view, wash = NoisyBlocks.of(basis, target), PaintedBlocks.of(basis, target).wash
+        first, _ = view.disturbed(np.random.default_rng(0))
+        return ((first.rows - wash.rows) * view.noise > 0).reshape(3, -1, *SIZE)
+
+    def in_squares(values: Any) -> Any:
+        y, x = np.indices(SIZE) // 2 * 2
+        return values[..., y, x]
+
+    alone = signs()
+    assert (alone != in_squares(alone)).mean() > 0.3
+    monkeypatch.setattr(expected_lights, "read_look_side", lambda _basis: 2)
+    np.testing.assert_array_equal(signs(), in_squares(signs()))
+
+
 @pytest.mark.parametrize("steady", [-6.0, 3.0, 8.0])
 def test_what_readings_change_alike_is_no_scatter(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, steady: float
