@@ -363,6 +363,25 @@ def test_means_of_lit_pixels_are_those_of_all_pixels(
         np.testing.assert_allclose(means.rows(1, 2), expected[:, 1:2], rtol=1e-6)
 
 
+@pytest.mark.parametrize("in_memory", [0, 2**27])
+def test_planes_of_several_walks_are_those_of_one_light_each(
+    monkeypatch: pytest.MonkeyPatch, in_memory: int
+) -> None:
+    """Of strips in memory or in a file, with one light that is kept whole, and one scaled."""
+    monkeypatch.setattr(lit_planes, "MAX_BYTES_IN_MEMORY", in_memory)
+    monkeypatch.setattr(lit_planes, "PLANES_PER_WALK", 2)
+    rng = np.random.default_rng(13)
+    images = rng.random((5, *SIZE, 3), np.float32) * (rng.random((5, *SIZE, 1)) < 0.4)
+    images = images.astype(np.float16).astype(np.float32)
+    stored = [LitPlane.of(np.moveaxis(x.astype(np.float16), -1, 0), 1.0) for x in images]
+    stored[1] = replace(stored[1], scale=4.0)
+    stored[2] = LitPlane.of(np.moveaxis(images[2], -1, 0), 1.0)
+    images[1] *= 4
+    lit = LitPlanes(stored, SIZE)
+    np.testing.assert_array_equal([*lit], images)
+    np.testing.assert_array_equal([lit.plane(k) for k in range(lit.count)], images)
+
+
 def test_mixes_of_lit_pixels_are_those_of_one_after_the_other() -> None:
     """To the bit, and to round-off those of all pixels; one light is kept whole, and one scaled."""
     rng = np.random.default_rng(12)

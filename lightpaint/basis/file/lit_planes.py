@@ -25,6 +25,7 @@ from lightpaint.arrays import (
 )
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes, TemporaryArray
 from lightpaint.basis.file.lit_strips import (
+    LitPart,
     LitStrip,
     StripsInFile,
     StripsInMemory,
@@ -54,6 +55,9 @@ MAX_BYTES_IN_MEMORY = 2**27
 #: Bytes of collected planes that go to one temporary file, and strips that are made of such planes
 #: until the pages of the files are released.
 SPOOLED_BYTES, STRIPS_PER_RELEASE = 2**26, 8
+
+#: Number of planes that are taken out of all strips in one walk.
+PLANES_PER_WALK = 128
 
 
 @dataclass(frozen=True)
@@ -173,28 +177,50 @@ class LitPlanes(RowPlanes):
         scale = float(self._scales[i])
         if i in self._clean:
             return LitPlane.of([*self._clean.pixels(i)], scale)
-        # One copy of all strips: there are many, of few lit pixels each.
-        of_strips = [self._lit.lit_of(k, i) for k in range(len(self._begins))]
+        return self._joined(i, [self._lit.lit_of(k, i) for k in range(len(self._begins))])
+
+    def _joined(self, i: int, of_strips: Sequence[LitPart]) -> LitPlane:
+        """Return the plane of light i by its parts in all strips, of which it is a copy."""
         lit = [x + np.uint32(y) for (x, _), y in zip(of_strips, self._begins, strict=True)]
-        return LitPlane(
-            np.concatenate(lit), np.concatenate([x for _, x in of_strips], axis=1), scale
-        )
+        numbers = np.concatenate([x for _, x in of_strips], axis=1)
+        return LitPlane(np.concatenate(lit), numbers, float(self._scales[i]))
+
+    def __iter__(self) -> Iterator[Floats]:
+        progress = iter(with_progress(range(self.count), "lights"))
+        for first in range(0, self.count, PLANES_PER_WALK):
+            lights = range(first, min(first + PLANES_PER_WALK, self.count))
+            parts = [self._lit.lit_of_planes(k, lights) for k in range(len(self._begins))]
+            for i, of_strips in zip(lights, zip(*parts, strict=True), strict=True):
+                next(progress, None)
+                if i in self._clean:
+                    yield self.plane(i)
+                else:
+                    stored = self._joined(i, of_strips)
+                    yield self._dense(*self._light_of(stored))
+        next(progress, None)
 
     def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
-        pixels: slice | Indices
-        if i in self._clean:
-            pixels, values = slice(None), self._clean.pixels(i).copy()
-        else:
-            stored = self.stored(i)
-            pixels, values = stored.pixels.astype(np.intp), as_singles(stored.numbers)
+        if i not in self._clean:
+            return self._light_of(self.stored(i))
+        values = self._clean.pixels(i).copy()
         if self._scales[i] != 1:
             values *= self._scales[i]
-        return pixels, values
+        return slice(None), values
+
+    def _light_of(self, stored: LitPlane) -> tuple[Indices, Floats]:
+        """Return the lit pixels of a plane that is stored by them, and their light, (3, p)."""
+        values = as_singles(stored.numbers)
+        if stored.scale != 1:
+            values *= np.float32(stored.scale)
+        return stored.pixels.astype(np.intp), values
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        pixels, values = self.lit_plane(i)
+        return self._dense(*self.lit_plane(i))
+
+    def _dense(self, pixels: slice | Indices, values: Floats) -> Floats:
+        """Return the plane, (h, w, 3), with light, (3, p), in some pixels alone."""
         plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
         plane[:, pixels] = values
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)

@@ -140,6 +140,10 @@ class StripsInMemory:
         """Return the lit pixels of plane i in the k-th strip."""
         return self._strips[k].lit_of(i)
 
+    def lit_of_planes(self, k: int, planes: Sequence[int]) -> list[LitPart]:
+        """Return the same of several planes."""
+        return [self._strips[k].lit_of(i) for i in planes]
+
 
 class StripsInFile:
     """Strips in a temporary file, each of which is read at once. size: in bytes, of all, at most.
@@ -171,6 +175,11 @@ class StripsInFile:
             self._file.read(first, words)
             arrays.append(words.view(empty.dtype)[:count])
         return replace(strip, lit=arrays[0], numbers=arrays[1].reshape(3, m))
+
+    def lit_of_planes(self, k: int, planes: Sequence[int]) -> list[LitPart]:
+        """Return the lit pixels of several planes in the k-th strip, which is read once."""
+        strip = self.strip(k)
+        return [(lit.copy(), numbers.copy()) for lit, numbers in map(strip.lit_of, planes)]
 
     def lit_of(self, k: int, i: int) -> LitPart:
         """Return the lit pixels of plane i in the k-th strip."""
