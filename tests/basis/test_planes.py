@@ -363,35 +363,36 @@ def test_means_of_lit_pixels_are_those_of_all_pixels(
         np.testing.assert_allclose(means.rows(1, 2), expected[:, 1:2], rtol=1e-6)
 
 
-@pytest.mark.parametrize("in_memory", [0, 2**27])
-def test_planes_of_several_walks_are_those_of_one_light_each(
-    monkeypatch: pytest.MonkeyPatch, in_memory: int
-) -> None:
-    """Of strips in memory or in a file, with one light that is kept whole, and one scaled."""
-    monkeypatch.setattr(lit_planes, "MAX_BYTES_IN_MEMORY", in_memory)
-    monkeypatch.setattr(lit_planes, "PLANES_PER_WALK", 2)
-    rng = np.random.default_rng(13)
+def lit_planes_of_each_kind(seed: int) -> tuple[LitPlanes, np.ndarray]:
+    """Five planes by their lit pixels, one of which is kept whole, and one scaled; and their light,
+    (5, h, w, 3).
+    """
+    rng = np.random.default_rng(seed)
     images = rng.random((5, *SIZE, 3), np.float32) * (rng.random((5, *SIZE, 1)) < 0.4)
     images = images.astype(np.float16).astype(np.float32)
     stored = [LitPlane.of(np.moveaxis(x.astype(np.float16), -1, 0), 1.0) for x in images]
     stored[1] = replace(stored[1], scale=4.0)
     stored[2] = LitPlane.of(np.moveaxis(images[2], -1, 0), 1.0)
     images[1] *= 4
-    lit = LitPlanes(stored, SIZE)
+    return LitPlanes(stored, SIZE), images
+
+
+@pytest.mark.parametrize("in_memory", [0, 2**27])
+def test_planes_of_several_walks_are_those_of_one_light_each(
+    monkeypatch: pytest.MonkeyPatch, in_memory: int
+) -> None:
+    """Of strips in memory or in a file."""
+    monkeypatch.setattr(lit_planes, "MAX_BYTES_IN_MEMORY", in_memory)
+    monkeypatch.setattr(lit_planes, "PLANES_PER_WALK", 2)
+    lit, images = lit_planes_of_each_kind(13)
     np.testing.assert_array_equal([*lit], images)
     np.testing.assert_array_equal([lit.plane(k) for k in range(lit.count)], images)
 
 
 def test_mixes_of_lit_pixels_are_those_of_one_after_the_other() -> None:
-    """To the bit, and to round-off those of all pixels; one light is kept whole, and one scaled."""
-    rng = np.random.default_rng(12)
-    images = rng.random((5, *SIZE, 3), np.float32) * (rng.random((5, *SIZE, 1)) < 0.4)
-    images = images.astype(np.float16).astype(np.float32)
-    stored = [LitPlane.of(np.moveaxis(x.astype(np.float16), -1, 0), 1.0) for x in images]
-    stored[1] = replace(stored[1], scale=4.0)
-    stored[2] = LitPlane.of(np.moveaxis(images[2], -1, 0), 1.0)
-    images[1] *= 4
-    lit, weights = LitPlanes(stored, SIZE), rng.normal(size=(3, 5, 3))
+    """To the bit, and to round-off those of all pixels."""
+    lit, images = lit_planes_of_each_kind(12)
+    weights = np.random.default_rng(14).normal(size=(3, 5, 3))
     together = lit.mixes(weights)
     np.testing.assert_array_equal(together, np.concatenate([lit.mixes(x[None]) for x in weights]))
     expected = MemoryPlanes(images).mixes(weights)
