@@ -250,9 +250,9 @@ def spoken_gain(release: Reason | Loosening, about: str = "") -> str:
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:
-    """Return a clause on noise of the painting, or of the lights' images if that is unknown."""
+    """Return a clause on grain of the painting, or of the lights' images if that is unknown."""
     if diagnosis.noise > 0:
-        return "is noise of the painting, as renders have"
+        return "is finer detail of the painting than light can show (grain, edges, texture)"
     return "is noise of the painting or of the lights' images"
 
 

@@ -300,7 +300,7 @@ def _shares(diagnosis: lighting.Diagnosis) -> list[dict[str, Any]]:
     optional_parts = [
         ("compromise", "given up for the other views", d.compromise),
         ("noise", "noise of the basis", d.noise),
-        ("painting_noise", "noise of the painting", d.painting_noise),
+        ("painting_noise", "grain, edges and texture of the painting", d.painting_noise),
     ]
     parts += [part for part in optional_parts if part[2] > 0]
     percents = diagnosis_sentences.spoken_shares(d)
