@@ -17,6 +17,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ import lightpaint as lp
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.rendered_basis import basis_of_sums
+from lightpaint.scene import render_first_hits
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.target.painted_target import Target
@@ -169,12 +171,14 @@ def rendered_bases(scene: Scene, seeds: int, spp: int, factor: int) -> Iterator[
     """Yield a basis of `spp` samples per pixel for each seed, and one of all samples.
 
     Each is a stretch of the pixels' sequences: as evenly spread as the first, and scrambled alike.
-    factor: of the samples that the last one has.
+    All have the surfaces in view, as every rendered basis has. factor: of the samples that the last
+    one has.
     """
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer, rows, half_spp = Tracer(scene, 0), range(scene.size[0]), spp // 2
     table = train_tracer(tracer, lambda: None)
+    features, objects = render_first_hits(scene, seed=0)
     total: list[np.ndarray] = []
     emitter_mask = np.zeros(scene.size, bool)
     for seed in range(seeds):
@@ -187,14 +191,17 @@ def rendered_bases(scene: Scene, seeds: int, spp: int, factor: int) -> Iterator[
         total = total or [np.zeros(x.shape) for x in sums]
         for all_of_them, part in zip(total, sums, strict=True):
             all_of_them += part
-        yield basis_of_sums(scene, 0, sums, emitter_mask, half_spp, table, start=None)
+        basis = basis_of_sums(scene, 0, sums, emitter_mask, half_spp, table, start=None)
+        yield replace(basis, features=features, objects=objects)
     for half in range(2):
         planes = tracer.planes(rows)
         tracer.add(planes, half, rows, seeds * half_spp, (factor - 1) * seeds * half_spp)
         total[half] += planes.sums()
     tracer.close()
     sums = [x.astype(np.float32) for x in total]
-    yield basis_of_sums(scene, 0, sums, emitter_mask, factor * seeds * half_spp, table, start=None)
+    half_spp *= factor * seeds
+    basis = basis_of_sums(scene, 0, sums, emitter_mask, half_spp, table, start=None)
+    yield replace(basis, features=features, objects=objects)
 
 
 if __name__ == "__main__":

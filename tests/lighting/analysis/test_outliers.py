@@ -1,5 +1,6 @@
 """Lights that are little but stray bright pixels: intervals that hold, and what is said."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 import scipy
 from nightly import nightly
 
+from lightpaint.lighting.analysis.noise.basis_noise import noise_sums
 from lightpaint.lighting.analysis.noise.dominant_pixels import (
     PEAK_SHARE,
     T_RATIOS,
     TWO_PATHS,
     Peaks,
+    most_noise,
     t_ratios,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
@@ -147,6 +150,11 @@ def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
         assert text.count(UNTOLD_HERE) == 1
 
 
+def _rare(lights: Any, _pixels: Any) -> Any:
+    """The limits of pixels that rare paths may have met."""
+    return np.full(lights.size, TWO_PATHS)
+
+
 def test_peaks_by_hand():
     """A pixel with most of what could push, in which both halves agree by chance."""
     possible, push = np.full((1, 101), 1.0), np.full((1, 101), 0.1)
@@ -154,27 +162,66 @@ def test_peaks_by_hand():
     # As if the pixels came in blocks: what was a peak of the first is none of all.
     peaks = Peaks.empty(1)
     for part in np.array_split(np.arange(101), 4):
-        peaks.add(possible[:, part], push[:, part], push[:, part])
+        peaks.add(possible[:, part], push[:, part], push[:, part], _rare)
     # Half of 200: it says nothing, the others 0.01 each, and it may be twice as noisy.
     assert peaks.total[0] == pytest.approx(200)
     assert peaks.hidden()[0] == pytest.approx(4 * 0.01 * 100)
     # It says 0.04 of itself, and alone it may be 42 times that: more than two paths have.
     push[0, 50] = 2
     peaks = Peaks.empty(1)
-    peaks.add(possible, push, push)
+    peaks.add(possible, push, push, _rare)
     assert 0.04 * T_RATIOS[0] ** 2 > TWO_PATHS
     assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100 - 4)
     # By the light of the pixel beside it pushes nothing, but its halves differ by a fifth of it.
     push[0, 50], shown = 0, push.copy()
     shown[0, 50] = 2
     peaks = Peaks.empty(1)
-    peaks.add(possible, push, shown)
+    peaks.add(possible, push, shown, _rare)
     assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100)
     # Of many alike none decides.
     peaks = Peaks.empty(1)
     few = int(1 / PEAK_SHARE) + 1
-    peaks.add(np.ones((1, few)), *np.full((2, 1, few), 0.1))
+    peaks.add(np.ones((1, few)), *np.full((2, 1, few), 0.1), _rare)
     assert peaks.hidden()[0] == 0
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
+def test_many_paths_limit_the_variance_of_a_pixel(share: float):
+    """Means of samples that meet an emitter or not, which is the widest that radiance up to 1 may
+    scatter, and of such that meet it in part.
+    """
+    rng, samples = np.random.default_rng(0), 64
+    hits = rng.random((20_000, samples)) < share
+    for values in (hits, hits * rng.random(hits.shape)):
+        means = values.mean(axis=1)
+        measured = means.var() / means.mean() ** 2
+        limit = most_noise(means.mean(keepdims=True), np.array([True]), samples)[0]
+        # Means of 20,000 squares are known to 2 %.
+        assert measured < 1.02 * limit or limit == TWO_PATHS
+        if values is hits and limit < TWO_PATHS:
+            assert measured == pytest.approx(limit, rel=0.04)
+    # More than its radiance is not seen of a light, so its unit is another one.
+    for light, is_radiance in ((share, False), (1.5, True), (0.0, True)):
+        limits = most_noise(np.array([light]), np.array([is_radiance]), samples)
+        assert limits[0] == TWO_PATHS
+
+
+def test_a_lamp_at_the_edge_of_a_mirror_hides_no_noise(make_basis: Any):
+    """One pixel has most of a light, and is a third of a lamp that 64 samples look at."""
+    lights = _lights()
+    lights[2] *= 1e-3
+    lights[2, 8, 8] = 1 / 3
+    halves = np.zeros_like(lights)
+    halves[2, 8, 8] = 0.03
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0.8], lights).astype(np.float32)
+    image[:, 12:] *= 0.7
+    target = Target("t", image, np.ones(SIZE, np.float32), everything=True)
+    basis = make_basis(images=lights, half_differences=halves, names="abc")
+    rare = replace(basis, lights=tuple(replace(x, unit="W/sr") for x in basis.lights))
+    seen, hidden = (noise_sums(solve(x, target)).hidden for x in (basis, rare))
+    # Of 21 paths the variance is (2 / 3) / 21 at most; by one square of .09 it may be .34.
+    assert (seen[:, 2] < hidden[:, 2] / 5).all()
+    assert (hidden[:, 2] > 0).all()
 
 
 def test_ratios_are_those_of_student() -> None:

@@ -52,6 +52,9 @@ MAX_NOISE_SHARE = 0.5
 #: Fewest lights whose noise is summed in float32.
 MIN_SINGLE_LIGHTS = 32
 
+#: Unit of weights that are the radiance of an emitter of one colour.
+RADIANCE_UNIT = "W/(m² sr)"
+
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
 
@@ -110,6 +113,14 @@ class Noise:
         1 where `hidden` includes that already.
         """
         return np.where(self.hidden > 0, 1, t_ratios(self.freedom)).T
+
+    @property
+    def steady_power(self) -> Doubles:
+        """`power` without lights whose noise a few pixels may hide, (3, n, n): there it is known by
+        the squares of few half differences.
+        """
+        steady = self.hidden == 0
+        return self.power * steady[:, :, None] * steady[:, None, :]
 
     @property
     def is_hidden(self) -> Bools:
@@ -183,7 +194,8 @@ def couples_channels(solution: Solution) -> bool:
 class NoisyPixels:
     """Data of all pixels of a solution, from which the noise in its gradient follows.
 
-    planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
+    planes, noise: of the basis. is_radiance: (n,), whether weights are radiances. samples: per
+    pixel. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
     pull on the weights. gradients: of the loss by the light of each pixel. own_share: as
     the function of this name returns it.
@@ -191,6 +203,8 @@ class NoisyPixels:
 
     planes: Planes
     noise: Planes
+    is_radiance: Bools
+    samples: float
     weights: Doubles
     weight: Floats
     share: Floats
@@ -215,7 +229,8 @@ class NoisyPixels:
         counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
         residuals = Residuals.of(solution)
         of_pixels = PixelGradients.of(solution, residuals), own_share(problem, removed)
-        planes = basis.planes, basis.noise
+        of_lights = np.array([light.unit == RADIANCE_UNIT for light in basis.lights])
+        planes = basis.planes, basis.noise, of_lights, basis.origin.spp
         return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled, *of_pixels)
 
     def gradient_noise(self, pixels: slice | Indices) -> Doubles:
@@ -307,6 +322,8 @@ class NoisyPixels:
             unseen=self.unseen[pixels],
             weights=self.weights[:, c].astype(kind),
             pulled=self.pulled[:, c].astype(kind),
+            is_radiance=self.is_radiance,
+            samples=self.samples,
             has_pull=bool(self.pulled.any()),
             own_share=own,
             of_noise=of_noise,

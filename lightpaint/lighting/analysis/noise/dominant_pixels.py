@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Indices
 
 #: Share of the possible push on a light from which a single pixel is one of few that decide.
 PEAK_SHARE = 0.4
@@ -31,18 +31,24 @@ T_RATIOS = (6.483, 2.195, 1.624, 1.416, 1.312)
 MAX_UNLIKE = 4.0
 
 
+#: A function from lights and pixels of a block, (m,) each, to the largest variances that these may
+#: have, relative to the squares of their light, (m,).
+MostNoise = Callable[[Indices, Indices], Doubles]
+
+
 @dataclass
 class Peaks:
     """The pixels that could push one light most, collected block by block; of one channel.
 
     total, pushed: (n,), sums of u² and z² so far; u is the push of a pixel if all of it were noise,
-    z the push by its half difference. candidates: lights, u², z² and v² of single pixels; v is the
-    share of u by which the halves of the pixel differ, whatever the pixel beside shows.
+    z the push by its half difference. candidates: lights, u², z², v² and κ² of single pixels; v is
+    the share of u by which the halves of the pixel differ, whatever the pixel beside shows, and κ²
+    the largest variance that it may have, relative to u².
     """
 
     total: Doubles
     pushed: Doubles
-    candidates: list[tuple[npt.NDArray[np.intp], Doubles, Doubles, Doubles]] = field(
+    candidates: list[tuple[npt.NDArray[np.intp], Doubles, Doubles, Doubles, Doubles]] = field(
         default_factory=list
     )
 
@@ -51,7 +57,15 @@ class Peaks:
         """Return the state before the first block."""
         return cls(np.zeros(n), np.zeros(n))
 
-    def add(self, could: Doubles, push: Doubles, shown: Doubles, *, first: int = 0) -> None:
+    def add(
+        self,
+        could: Doubles,
+        push: Doubles,
+        shown: Doubles,
+        most: MostNoise,
+        *,
+        first: int = 0,
+    ) -> None:
         """Add a block of some lights from `first` on: u, z and v, (lights, pixels) each."""
         lights = slice(first, first + len(could))
         u2 = np.square(could)
@@ -61,7 +75,8 @@ class Peaks:
         light, pixel = np.nonzero(u2 > PEAK_SHARE * self.total[lights, None])
         if light.size:
             z2, v2 = (np.square(x[light, pixel]) for x in (push, shown))
-            self.candidates.append((light + first, u2[light, pixel], z2, v2))
+            limit = most(light + first, pixel)
+            self.candidates.append((light + first, u2[light, pixel], z2, v2, limit))
 
     def add_entries(
         self,
@@ -69,6 +84,7 @@ class Peaks:
         could: Doubles,
         push: Doubles,
         shown: Doubles,
+        most: MostNoise,
         of_lights: Callable[[Doubles], Doubles],
     ) -> None:
         """Add a block by its lit pixels: their lights, u, z and v, (m,) each.
@@ -80,7 +96,8 @@ class Peaks:
         self.pushed += of_lights(z2)
         large = np.flatnonzero(u2 > PEAK_SHARE * self.total[lights])
         if large.size:
-            self.candidates.append((lights[large], u2[large], z2[large], np.square(shown[large])))
+            squares = u2[large], z2[large], np.square(shown[large])
+            self.candidates.append((lights[large], *squares, most(lights[large], large)))
 
     def merge(self, more: "Peaks") -> None:
         """Include the pixels that others collected."""
@@ -92,12 +109,12 @@ class Peaks:
         """Return the variance that few pixels may have beyond their half differences, (n,).
 
         For pixels with PEAK_SHARE of Σ u² or more: the variance relative to u², as they or the
-        others show it, times the width of Student's t for so few, and at most TWO_PATHS.
+        others show it, times the width of Student's t for so few, and at most κ².
         """
         hidden = np.zeros(self.total.size)
         if not self.candidates:
             return hidden
-        lights, u2, z2, v2 = (np.concatenate(x) for x in zip(*self.candidates, strict=True))
+        lights, u2, z2, v2, limits = (np.concatenate(x) for x in zip(*self.candidates, strict=True))
         is_peak = u2 > PEAK_SHARE * self.total[lights]
         for k in np.unique(lights[is_peak]):
             own_peaks = is_peak & (lights == k)
@@ -109,8 +126,23 @@ class Peaks:
             wider = t_ratios(could**2 / np.square(u2[own_peaks]).sum())
             seen = max(observed, float(v2[own_peaks].sum()))
             variance = max(seen / could * float(wider) ** 2, MAX_UNLIKE * share_of_others)
-            hidden[k] = max(min(variance, TWO_PATHS) * could - observed, 0)
+            most = float(limits[own_peaks] @ u2[own_peaks])
+            hidden[k] = max(min(variance * could, most) - observed, 0)
         return hidden
+
+
+def most_noise(light: Doubles, is_radiance: Bools, samples: float) -> Doubles:
+    """Return the largest variance of pixels, (m,), relative to the square of their light: TWO_PATHS
+    of rare paths.
+
+    With multiple importance sampling no sample brings more than the radiance of an emitter, 1
+    (Veach 1997, 9.2). The mean c of `samples` numbers from 0 to 1 has the relative variance
+    (1 - c) / (c samples) at most (Bhatia and Davis 2000), the variance of c samples paths. light:
+    (m,), c. is_radiance: (m,), whether it is of an emitter of that radiance.
+    """
+    is_bounded = is_radiance & (light > 0) & (light <= 1)
+    share = np.where(is_bounded, light, 1)
+    return np.where(is_bounded, np.minimum((1 - share) / (share * samples), TWO_PATHS), TWO_PATHS)
 
 
 def t_ratios(freedom: Doubles) -> Doubles:

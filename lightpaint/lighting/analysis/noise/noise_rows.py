@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis import LitEntries
-from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, Peaks
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, Peaks, most_noise
 
 #: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
 #: or a highlight that both halves have met.
@@ -167,9 +167,10 @@ class ChannelPixels:
 
     c: the channel. D: their weight. mean, half: factors of the half differences and of the light of
     each light in its gradient. missing: |residual|. unseen: where no emitter is. All (p,). weights,
-    pulled: (n,), of the lights; has_pull: whether any light is pulled, in any channel. own_share:
-    of a pixel in a factor. of_noise, of_light, doubt: (p,), by which half differences and light add
-    to `target_noise` and `doubt`; None if they do not.
+    pulled: (n,), of the lights; is_radiance: (n,), whether weights are radiances; has_pull: whether
+    any light is pulled, in any channel. samples: per pixel. own_share: of a pixel in a factor.
+    of_noise, of_light, doubt: (p,), by which half differences and light add to `target_noise` and
+    `doubt`; None if they do not.
     """
 
     c: int
@@ -180,7 +181,9 @@ class ChannelPixels:
     unseen: Bools
     weights: Doubles
     pulled: Doubles
+    is_radiance: Bools
     has_pull: bool
+    samples: float
     own_share: float
     of_noise: Doubles | None
     of_light: Doubles | None
@@ -190,6 +193,10 @@ class ChannelPixels:
     def own_share_of_pull(self) -> float:
         """Share of a pixel in a factor of the pull, which the noise correction leaves as it is."""
         return max(self.own_share, UNCORRECTED)
+
+    def most_noise(self, lights: Indices, light: Doubles) -> Doubles:
+        """Return the largest relative variance of the light, (m,), of some lights."""
+        return most_noise(light, self.is_radiance[lights], self.samples)
 
 
 #: A function from pixels of a channel, sums to which to add (None for none), and an array (n, p) to
@@ -222,7 +229,13 @@ def dense_rows(
             sums.light_squares[c, some] += np.einsum("ip,ip->i", weighed, weighed)
             size = pixels.missing + pixels.weights[some, None] * own_light
             shown = pixels.D * half * size
-            sums.peaks[c].add(weighed * size, row, shown, first=first)
+            sums.peaks[c].add(
+                weighed * size,
+                row,
+                shown,
+                lambda of, at: pixels.most_noise(of, lit[of, at]),
+                first=first,
+            )
         if pixels.has_pull:
             power = factor(own_light, half, pixels.own_share_of_pull) * half
             row += pixels.pulled[some, None] * np.where(pixels.unseen, power, 0)
@@ -313,7 +326,14 @@ class LitPairs:
             sums.light_squares[c] += self._of_lights(np.square(weighed))
             size = pixels.missing[at] + pixels.weights[of] * light
             shown = pixels.D[at] * h * size
-            sums.peaks[c].add_entries(of, weighed * size, row, shown, self._of_lights)
+            sums.peaks[c].add_entries(
+                of,
+                weighed * size,
+                row,
+                shown,
+                lambda of, large: pixels.most_noise(of, light[large]),
+                self._of_lights,
+            )
         if pixels.has_pull:
             power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
             row += pixels.pulled[of] * pixels.unseen[at] * power

@@ -365,7 +365,10 @@ def error_bars(
     covariance, center = noise.full_covariance, weights + bias
     painted = _painting_covariance(solution) if with_painting else None
     spreads = []
-    for scatters in [unbiased] if is_unbiased else [problem.solved, unbiased]:
+    steady = unbiased
+    if noise.hidden.any():
+        steady = step.equations(denoised_matrix(problem.equations, noise.steady_power))
+    for scatters in [steady] if is_unbiased else [problem.solved, steady]:
         response = WeightResponse(solution, scatters, unbiased, center)
         painting = np.zeros_like(weights) if painted is None else response.spread(painted[0]).inside
         spreads.append((response.spread(covariance), painting))
