@@ -141,9 +141,10 @@ def read_look_noise(basis: Basis) -> Floats:
     half difference of either sign.
     """
     noise, indirect = basis.current_noise, basis.indirect
-    features, along_surfaces = basis.surfaces(READ_SIDE)
-    if not _can_read(basis) or indirect is None or along_surfaces is None:
+    if not _can_read(basis) or indirect is None:
         return noise
+    features, along_surfaces = basis.surfaces(READ_SIDE)
+    assert along_surfaces is not None
 
     def make() -> Floats:
         parts = (x.mix(basis.current_weights) for x in (indirect.planes, indirect.noise))
@@ -171,8 +172,9 @@ def read_look_side(basis: Basis) -> int:
 
 def _can_read(basis: Basis) -> bool:
     """Return whether `read_look` has less noise than the current look."""
-    knows_parts = basis.indirect is not None and basis.surfaces(READ_SIDE)[1] is not None
-    return basis.former is None and basis.knows_noise and knows_parts
+    if min(basis.planes.size) < READ_SIDE or basis.former is not None or not basis.knows_noise:
+        return False
+    return basis.indirect is not None and basis.surfaces(READ_SIDE)[1] is not None
 
 
 def _on_pixels(blocks: Floats, shape: tuple[int, ...]) -> Floats:

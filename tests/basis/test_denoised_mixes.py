@@ -16,6 +16,7 @@ from lightpaint.basis.denoised_mixes import (
     denoise_plane,
     read_look,
     read_look_noise,
+    read_look_side,
 )
 from lightpaint.basis.file.basis_file import as_stored, read_basis, write_basis
 from lightpaint.basis.light_basis import Basis, Origin
@@ -360,6 +361,18 @@ def test_the_look_of_a_picture_with_odd_sides_is_read(
         np.testing.assert_allclose(change[-1], change[-2], atol=1e-6)
     if size[1] % READ_SIDE:
         np.testing.assert_allclose(change[:, -1], change[:, -2], atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
+def test_the_look_of_a_line_of_pixels_is_read_as_it_is(
+    size: tuple[int, int], rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    """No block fits into it."""
+    monkeypatch.setitem(globals(), "SIZE", size)
+    basis = replace(split_basis(*pools_and_glow(), rng), features=wall())
+    assert read_look(basis) is basis.current_look
+    np.testing.assert_array_equal(read_look_noise(basis), basis.current_noise)
+    assert read_look_side(basis) == 1
 
 
 def test_without_known_parts_the_look_is_read_as_it_is(rng: np.random.Generator):

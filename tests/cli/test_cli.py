@@ -74,6 +74,19 @@ def test_solve_leaves_everything_it_promises(solved_job: tuple[Path, str]) -> No
     assert f"lightpaint solve {CORNELL} {WARM} --spp 32" in page
 
 
+@pytest.mark.parametrize("size", [(1, 1), (1, 5)])
+def test_a_film_of_a_pixel_or_a_line_is_solved(tmp_path: Path, size: tuple[int, int]) -> None:
+    """Lights are found and moved: pictures that are made smaller on the way have a pixel left."""
+    room = write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"])
+    text = room.read_text(encoding="utf-8")
+    for side, length in zip(("width", "height"), size, strict=True):
+        text = re.sub(rf'(<integer name="{side}" value=")[^"]+', rf"\g<1>{length}", text)
+    room.write_text(text, encoding="utf-8")
+    Image.new("RGB", size, (120, 100, 80)).save(tmp_path / "p.png")
+    succeed(tmp_path, "solve", "room.xml", "p.png", "--spp", 4, "--move", "bulb=0.1")
+    assert {p.name for p in (tmp_path / "p").iterdir()} >= RESULTS
+
+
 def test_the_command_that_a_report_shows_works_from_any_folder(
     basis_file: Path, tmp_path: Path
 ) -> None:
@@ -524,7 +537,7 @@ def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
 
 
 def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
-    room = write_room(tmp_path)
+    room = write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"])
     text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
     room.write_text(text, encoding="utf-8")
     assert "-D width=VALUE" in run_refused(tmp_path, "lights", room)
