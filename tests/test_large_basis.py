@@ -17,9 +17,9 @@ from lightpaint.images import denoiser, pixel_blocks
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import pixel_loss
 
-#: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 4.2 GB at
+#: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 3.5 GB at
 #: 3840 x 2160, where libraries and strips of 100 lights take another half.
-BYTES_A_PIXEL = 510
+BYTES_A_PIXEL = 420
 
 
 #: Noise of a light, relative to it, at which blocks of pixels are fitted.

@@ -222,9 +222,15 @@ class DeferredSquares(pixel_loss.Squares):
     They are as large as several pictures, and most answers need only their sums.
     """
 
-    def __init__(self, lit: LitPixels, weights: Doubles) -> None:
-        """Keep the source of the squares. lit: of all pixels. weights: (n, 3), of the picture."""
+    def __init__(
+        self, lit: LitPixels, weights: Doubles, made: pixel_loss.Squares | None = None
+    ) -> None:
+        """Keep the source of the squares. lit: of all pixels. weights: (n, 3), of the picture.
+        made: the squares, if there are some now.
+        """
         self._lit, self._weights = lit, weights
+        if made is not None:
+            self._arrays = made.image, made.weight, made.share
 
     @cached_property
     def _arrays(self) -> tuple[Doubles, Doubles, Doubles]:

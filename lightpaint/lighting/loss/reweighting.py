@@ -21,7 +21,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, release_freed_memory
 from lightpaint.basis import Basis, MemoryPlanes, walked_blocks
-from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
+from lightpaint.images import is_large
+from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels, SummedSquares
 from lightpaint.lighting.loss.pixel_loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
 
@@ -193,6 +194,8 @@ def descend(
         image, weight = loss.pixels.squares(x, from_clipping=result.from_clipping)
     share = loss.pixels.shares(x, weight)
     squares = Squares(*(image_in_place(x, basis.size) for x in (image, weight, share)))
+    if is_large(basis.size) and not result.from_clipping:
+        squares = DeferredSquares(LitPixels.whole(basis, loss), result.at, squares)
     reweighting = Reweighting(result.at, result.count, result.step, result.converged)
     return Descent(result.weights, squares, result.equations, reweighting)
 

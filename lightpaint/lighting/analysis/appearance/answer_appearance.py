@@ -357,6 +357,7 @@ def compare_appearance(
     if not missed.any():
         return appearance
     place, share = place_with_most_error(look, missed, light, grain)
+    del light, grain, now  # what follows needs memory for pictures
     appearance = replace(appearance, place=place, is_spot=share >= SPOT)
     if not appearance.has_miss:
         return appearance
@@ -395,13 +396,7 @@ def _with_reasons(
 
     look, area: of the paint in question; the area is None for all paint.
     """
-    light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
-    _, missed = block_differences(look, light, grain)
-    if missed.any():
-        place, _ = place_with_most_error(look, missed, light, grain)
-        if (objects := solution.basis.objects) is not None:
-            place = replace(place, object=object_with_most_error(look, objects, missed, light))
-        appearance = _with_local_lights(replace(appearance, place=place), solution, place)
+    appearance = _with_place(appearance, solution, look, predicted)
     [target] = solution.problem.views.targets
     return replace(
         appearance,
@@ -413,8 +408,19 @@ def _with_reasons(
     )
 
 
-def _with_local_lights(appearance: Appearance, solution: Solution, place: Place) -> Appearance:
-    """Return the appearance with the lights that reach a place, and those that constraints hold."""
+def _with_place(
+    appearance: Appearance, solution: Solution, look: PaintComparison, predicted: Estimate
+) -> Appearance:
+    """Return the appearance with the place of most error, its object, and the lights that reach it,
+    some of which constraints hold.
+    """
+    light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
+    _, missed = block_differences(look, light, grain)
+    if not missed.any():
+        return appearance
+    place, _ = place_with_most_error(look, missed, light, grain)
+    if (objects := solution.basis.objects) is not None:
+        place = replace(place, object=object_with_most_error(look, objects, missed, light))
     local_lights, has_strong_light = lights_at(solution, place)
     # Without the constraint to be white, which applies to all.
     constraints, lights = solution.problem.constraints, solution.basis.lights
@@ -426,6 +432,7 @@ def _with_local_lights(appearance: Appearance, solution: Solution, place: Place)
     }
     return replace(
         appearance,
+        place=place,
         local_lights=local_lights,
         has_strong_light=has_strong_light,
         held_lights=tuple(name for name in local_lights if name in limits),

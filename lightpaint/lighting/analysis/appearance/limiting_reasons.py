@@ -346,15 +346,21 @@ def released_weights(
         problem.squares.release()
     # All constraints, also those of the bases' scenes, are among the constraints of the problem.
     bases = [basis.with_requests(type(basis.requests)()) for basis in problem.views.bases]
-    released = Problem.of(
-        bases,
-        list(problem.views.targets),
-        constraints=problem.constraints if constraints is None else constraints,
-        fit=fit or problem.fit,
+    # What holds an answer to other lights is no reason that could be released. Nothing else refers
+    # to the problem, so that its pictures go once it is solved.
+    released_solution = answer_released(
+        replace(
+            Problem.of(
+                bases,
+                list(problem.views.targets),
+                constraints=problem.constraints if constraints is None else constraints,
+                fit=fit or problem.fit,
+            ),
+            start=problem.start,
+            tether=problem.tether,
+        ),
+        problem.holding,
     )
-    # What holds an answer to other lights is no reason that could be released.
-    released = replace(released, start=problem.start, tether=problem.tether)
-    released_solution = answer_released(released, problem.holding)
     if problem.corrected is not None and solution.basis.knows_noise:
         released_solution = correct_noise(released_solution)
     return released_solution.weights

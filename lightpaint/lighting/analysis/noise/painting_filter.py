@@ -119,7 +119,7 @@ def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, F
     taken: what the painting lacks already.
     """
     weight = solution.problem.squares.weight
-    D = weight.reshape(-1, weight.shape[2]).astype(np.float64)
+    D = weight.reshape(-1, weight.shape[2]).astype(np.float64, copy=False)
     residuals, everything = Residuals.of(solution), slice(None)
     missed = FilterEffect(residuals.residual(everything), -residuals.noise(everything))
     D = np.broadcast_to(D, missed.image.shape)
