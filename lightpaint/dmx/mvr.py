@@ -18,7 +18,7 @@ from lightpaint.display_text import some_names
 from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead, RigLight
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_channels import ModeHead
-from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
+from lightpaint.dmx.gdtf.mode_lights import FixtureMode
 from lightpaint.errors import RigError
 from lightpaint.files import read_bytes
 from lightpaint.scene.properties.site import unit
@@ -333,14 +333,14 @@ def _lights(
     fixture: NamedFixture, mode: FixtureMode, target: Doubles | None
 ) -> tuple[RigLight, ...]:
     """Return the lights of a fixture. target: its focus point, if it has one."""
-    names = [f"{fixture.name} px{x.pixel}" if x.pixel else fixture.name for x in mode.lights]
+    names = [f"{fixture.name} {x.name}" if x.name else fixture.name for x in mode.lights]
     return tuple(
         _placed(name, light, fixture.node.matrix, target)
         for name, light in zip(names, mode.lights, strict=True)
     )
 
 
-def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None) -> RigLight:
+def _placed(name: str, light: RigLight, matrix: Doubles, target: Doubles | None) -> RigLight:
     """Return a light of a mode in the world. target: point that it is aimed at, if there is one."""
     position = matrix[:3, :3] @ light.position + matrix[:3, 3]
     direction, up = (matrix[:3, :3] @ way for way in (light.direction, light.up))
@@ -348,20 +348,8 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         direction = target - position
     if not np.linalg.norm(direction) > 0 or not np.linalg.norm(up) > 0:
         raise ValueError(f"the matrix of {name}, which has no volume")
-    return RigLight(
-        name,
-        as_position(position),
-        unit(direction),
-        unit(up),
-        light.beam_angle,
-        light.field_angle,
-        light.emitters,
-        light.dimmers,
-        light.masters,
-        light.filters,
-        light.chromaticity,
-        light.whites,
-        light.wheel,
+    return replace(
+        light, name=name, position=as_position(position), direction=unit(direction), up=unit(up)
     )
 
 

@@ -215,7 +215,7 @@ def _bar() -> bytes:
 def test_pixels_below_references_have_channels_and_places_of_their_own() -> None:
     mode = read_mode(_bar(), pixels=True)
     assert [x.offsets for x in mode.channels] == [(k,) for k in range(1, 11)]
-    assert [light.pixel for light in mode.lights] == [1, 2, 3]
+    assert [light.name for light in mode.lights] == ["px1", "px2", "px3"]
     channels = [[x.channels for x in light.emitters] for light in mode.lights]
     assert channels == [[(1,), (2,), (3,)], [(4,), (5,), (6,)], [(7,), (8,), (9,)]]
     assert np.allclose([light.position[0] for light in mode.lights], [0, 0.1, 0.2])

@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Position, as_position
 from lightpaint.colour import solid_angle
-from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
+from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigLight, RigWheel
 from lightpaint.dmx.gdtf import mode_channels
 from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
@@ -73,38 +73,18 @@ _RESTING = re.compile(r"CT[OBC]|Color\d+|ColorMacro\d*|HSB_\w+|Color(Add|Sub|RGB
 
 
 @dataclass(frozen=True)
-class ModeLight:
-    """A light in the axes of its fixture, in metres; all else as in `RigLight`.
-
-    pixel: number of the pixel, from 1; 0 for the whole fixture.
-    """
-
-    pixel: int
-    position: Doubles
-    direction: Doubles
-    up: Doubles
-    beam_angle: float
-    field_angle: float
-    emitters: tuple[RigEmitter, ...]
-    dimmers: tuple[int, ...] = ()
-    masters: tuple[int, ...] = ()
-    filters: tuple[RigFilter, ...] = ()
-    chromaticity: tuple[int, ...] = ()
-    whites: tuple[int, ...] = ()
-    wheel: RigWheel | None = None
-
-
-@dataclass(frozen=True)
 class FixtureMode:
     """A mode: its channels, its lights, where its emission comes from, what to know of it, and what
     turns.
 
-    lacking: the colours that its file lacks, for which usual ones stand.
+    lights: in the axes of their fixture, in metres; the name of a pixel is its number, like `px1`,
+    and "" of the whole fixture. lacking: the colours that its file lacks, for which usual ones
+    stand.
     """
 
     name: str
     channels: tuple[DmxChannel, ...]
-    lights: tuple[ModeLight, ...]
+    lights: tuple[RigLight, ...]
     emission: str
     remarks: tuple[str, ...] = ()
     heads: tuple[mode_channels.ModeHead, ...] = ()
@@ -321,7 +301,7 @@ class ModeReader:
         dimmers: Sequence[set[int]],
         shared: Collection[int],
         candelas: Mapping[tuple[int, str], float],
-    ) -> ModeLight | None:
+    ) -> RigLight | None:
         """Return the light of some beams; None if no channel dims it.
 
         dimmers: of each beam. shared: those that other lights have, too.
@@ -343,10 +323,9 @@ class ModeReader:
             emitters, parts = [replace(x, channels=tuple(parts)) for x in emitters], []
         for k in parts:
             self.dmx[k] = replace(self.dmx[k], default=self._full(k))
-        middle = _middle(beams)
-        return ModeLight(
-            number,
-            *middle,
+        return RigLight(
+            f"px{number}" if number else "",
+            *_middle(beams),
             max(x.beam_angle for x in beams),
             max(x.field_angle for x in beams),
             tuple(emitters),
@@ -360,11 +339,11 @@ class ModeReader:
 
     def _lone_light(
         self, beams: Sequence[_Beam], candelas: Mapping[tuple[int, str], float]
-    ) -> ModeLight:
+    ) -> RigLight:
         """Return the light of some beams that no channel sets."""
         angles = max(x.beam_angle for x in beams), max(x.field_angle for x in beams)
         emitters = tuple(self._emitters(beams, candelas))
-        return ModeLight(0, *_middle(beams), *angles, emitters)
+        return RigLight("", *_middle(beams), *angles, emitters)
 
     def _fineness(self, place: int) -> int:
         """Return the sort key of a dimmer: the finest first, since it carries the level."""
@@ -564,7 +543,7 @@ class ModeReader:
                 self.dmx[k] = replace(self.dmx[k], curve=curve)
         return found["X"][0], found["Y"][0]
 
-    def _remark_resting(self, lights: Sequence[ModeLight]) -> None:
+    def _remark_resting(self, lights: Sequence[RigLight]) -> None:
         """Remark on channels that change the colour, but rest."""
         used = {k for light in lights for k in (*light.chromaticity, *light.whites)}
         used |= {k for x in lights if x.wheel is not None for k in x.wheel.channels}
@@ -615,10 +594,11 @@ class ModeReader:
         return candelas, "LuminousFlux" if known is not None else f"{USUAL_LUMENS:g} lm"
 
 
-def _middle(beams: Sequence[_Beam]) -> tuple[Doubles, Doubles, Doubles]:
+def _middle(beams: Sequence[_Beam]) -> tuple[Position, Position, Position]:
     """Return position, direction and up of the middle of some beams, in the fixture's axes."""
     matrices = np.array([beam.placed.matrix for beam in beams])
     direction, up = -matrices[:, :3, 2].mean(axis=0), matrices[:, :3, 1].mean(axis=0)
     if np.linalg.norm(direction) < 1e-3:  # beams all around
         direction, up = -matrices[0, :3, 2], matrices[0, :3, 1]
-    return matrices[:, :3, 3].mean(axis=0), direction, up
+    position = matrices[:, :3, 3].mean(axis=0)
+    return as_position(position), as_position(direction), as_position(up)
