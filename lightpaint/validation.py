@@ -72,7 +72,7 @@ class Check:
 
 
 def parse_number(text: str | float) -> float:
-    """Return the number that a text is, in the digits 0 to 9. Raises ValueError for other text.
+    """Return the number that a text in the digits 0 to 9 stands for. Raises ValueError for others.
 
     Python itself takes the digits of all scripts, and underscores between them.
     """

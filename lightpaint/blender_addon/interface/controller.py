@@ -36,7 +36,7 @@ class Controller:
         self.reset()
 
     def reset(self):
-        """Forget everything, as of another file."""
+        """Forget everything: another file was opened."""
         self.render: ShotRender | None = None
         self.session: LiveSession | None = None
         self.solve: Any = None

@@ -232,7 +232,7 @@ def set_output(scene, path):
 
 
 def put_back_output(scene):
-    """Put back the settings of before a shot's render, if one has set them."""
+    """Restore the output settings that a shot's render has changed, if one has."""
     memory = recall(scene)
     before = memory.pop(RENDERING, None)
     if before is None:

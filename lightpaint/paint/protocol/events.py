@@ -165,7 +165,7 @@ class SelectionUpdate(message_parts.EditState, Event, kind="selected"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PictureUpdate(Event, kind="renewed", is_observed=True):
-    """New or replaced pictures, and their numbers. Unasked.
+    """New or replaced pictures, and their numbers. Sent without a request.
 
     resources: pictures, with a number that grows when one is replaced.
     """
@@ -175,8 +175,8 @@ class PictureUpdate(Event, kind="renewed", is_observed=True):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraggedPlane(Event, kind="dragged"):
-    """The picture of a light that is dragged, so that it need not be fetched. Unasked, before the
-    answer.
+    """The picture of a light that is dragged, so that it need not be fetched. Sent without a
+    request, before the answer.
 
     light: its index. view: the one that the request named. resources: numbers of its pictures, all
     of which are this one. step: as the request had it. data: (h, w, 3) float16, divided by the
@@ -264,7 +264,8 @@ class ReferenceList(Event, kind="references"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AnswerChoices(Event, kind="choices"):
-    """The answers with other light colours, to choose from. Unasked, once the exact answer rests.
+    """The answers with other light colours, to choose from. Sent without a request, once the exact
+    answer rests.
 
     version: of the session. choices: from the least freedom to the most; empty without paint, and
     where no light can change its colour. resources: numbers of their pictures.
@@ -304,7 +305,7 @@ class ConsoleState(Event, kind="console"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Notice(Event, kind="notice", is_observed=True):
-    """A sentence for users. Unasked. task: the one that it ends.
+    """A sentence for users. Sent without a request. task: the one that it ends.
 
     text: the sentence. tone: whether it is a warning.
     """

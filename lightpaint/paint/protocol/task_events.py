@@ -13,7 +13,7 @@ from lightpaint.paint.protocol.message_parts import Place, RenderInfo
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProgressReport(Event, kind="progress", is_observed=True):
-    """The progress of a long task. Unasked.
+    """The progress of a long task. Sent without a request.
 
     task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
     paint needs them, `planes` for measuring planes, or the renderer's name for the task. done,
@@ -28,7 +28,7 @@ class ProgressReport(Event, kind="progress", is_observed=True):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VerificationResult(Event, kind="verified", is_observed=True):
-    """The result of a verification; its render is the picture `verified`. Unasked.
+    """The result of a verification; its render is the picture `verified`. Sent without a request.
 
     is_old: whether the session has changed since. agrees: whether the render is the predicted
     picture but for noise. text: the result, in a sentence. view: index of the view.
@@ -60,7 +60,7 @@ class TaskStarted(Event, kind="started"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStopped(Event, kind="stopped"):
-    """Notice that a stopped task has ended. Unasked.
+    """Notice that a stopped task has ended. Sent without a request.
 
     task: the request.
     """
@@ -70,7 +70,7 @@ class TaskStopped(Event, kind="stopped"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExportResult(Event, kind="exported", is_observed=True):
-    """Files that were written. Unasked.
+    """Files that were written. Sent without a request.
 
     command: the command line that solves for the exported paintings; "" for none. is_stopped:
     whether the export was stopped before its end. is_unpainted: whether files that need a painting
@@ -94,8 +94,8 @@ class RenderList(Event, kind="renders"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explanation(Event, kind="explained"):
-    """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
-    Unasked.
+    """The reasons why a view is not closer to its painting; the picture `beyond` shows where. Sent
+    without a request.
 
     sentences: the reasons. view: index of the view. is_old: whether the session has changed since.
     """
@@ -107,8 +107,9 @@ class Explanation(Event, kind="explained"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreviewResult(Event, kind="previewed"):
-    """The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
-    whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
+    """The effect of a change, before it is made. Sent without a request. number: of the preview.
+    is_at_cost: whether it changes the unpainted part by more than it gains. before, after: (h, w,
+    3) uint8.
 
     view: as requested. text: the effect, in a sentence. is_old: whether the session has changed
     since.
@@ -125,7 +126,7 @@ class PreviewResult(Event, kind="previewed"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrialPlaces(Event, kind="trial"):
-    """The places that a search is trying. Unasked.
+    """The places that a search is trying. Sent without a request.
 
     positions, directions: by name of light, including new ones.
     """
@@ -149,7 +150,7 @@ class PlacingEstimate(Event, kind="place_estimate"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlacingResult(Event, kind="placed"):
-    """The result of a search for places of lights. Unasked.
+    """The result of a search for places of lights. Sent without a request.
 
     text: the moves or additions and their gain, or why there are none. names: of these lights.
     """

@@ -319,9 +319,8 @@ def distance_of(canvas: Canvas, reference: LightTones, light: Floats, known: Boo
 
 
 def key_lamps(basis: Basis, roles: LampRoles, reference: LightTones) -> list[Bools]:
-    """Return the lamps (n,) that make the key of a view: the likeliest for a reference.
-
-    Two groups, at the left and at the right, for a reference with a key of each.
+    """Return the lamps of a view, (n,), that serve best as the key light of a reference: two
+    groups, at the left and at the right, for a reference with a key light on either side.
     """
     is_on = basis.current_weights.any(axis=1) & ~basis.is_fixed
     usable = roles.lamps(is_on)
