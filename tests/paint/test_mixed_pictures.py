@@ -11,10 +11,11 @@ from studio_client import StudioClient
 import lightpaint as lp
 from lightpaint.colour import ACESCG
 from lightpaint.errors import PaintError
+from lightpaint.images import resampled
 from lightpaint.lighting.live.live_sums import DRAFTS_PER_SUM, SmallFilm
 from lightpaint.paint import protocol
 from lightpaint.paint.session import picture_table
-from lightpaint.paint.studio.mixed_pictures import FLOOR
+from lightpaint.paint.session.picture_table import FLOOR
 
 H, W, N, BLOCK = 24, 36, 5, 4
 
@@ -140,18 +141,19 @@ def test_paint_is_answered_with_its_draft(client: StudioClient, basis: lp.Basis)
     """The one that a page would ask for afterwards, under the master dimmer."""
     image, importance = np.full((6, 6, 3), 0.7, np.float32), np.ones((6, 6), np.float32)
     client.studio.handle(protocol.SetMaster(level=0.5), {})
-    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), draft_step=2)
+    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), with_draft=True)
     [answer] = client.studio.handle(request, {"image": image, "importance": importance})
     assert isinstance(answer, protocol.AnswerUpdate)
     assert answer.draft is not None
-    assert answer.draft_step == 2
+    assert answer.draft.shape == (H // BLOCK, W // BLOCK, 3)
     assert not np.allclose(answer.weights, basis.current_weights)
-    asked_for = mixed(client, 0.5 * answer.weights, step=2, is_live=True).data
-    # Drafts follow from one another: round-off may turn the last bit of a half.
-    np.testing.assert_allclose(answer.draft.astype(float), asked_for.astype(float), rtol=2.0**-10)
-    assert answer.draft.shape == (H // 2, W // 2, 3)
+    asked_for = mixed(client, 0.5 * answer.weights, is_live=True).data.astype(float)
+    detail = client.studio.resource("detail").astype(float)
+    # Halves have eleven bits, and there are three of them.
+    enlarged = resampled(answer.draft.astype(np.float32), (H, W))
+    np.testing.assert_allclose(enlarged * detail, asked_for, rtol=3 * 2.0**-11)
     plain = client.studio.handle(
-        replace(request, draft_step=None), {"image": image, "importance": importance}
+        replace(request, with_draft=False), {"image": image, "importance": importance}
     )
     assert plain[0].arrays.keys() == {"weights"}
 
@@ -163,7 +165,7 @@ def test_paint_stops_the_exact_picture_of_an_earlier_answer(
     for slot in (protocol.ANSWER_SLOT, 1):
         mixed(client, basis.current_weights, slot=slot)
     image, importance = np.full((6, 6, 3), 0.7, np.float32), np.ones((6, 6), np.float32)
-    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), draft_step=1)
+    request = protocol.Paint(stroke=1, region=(4, 10, 8, 14), with_draft=True)
     client.studio.handle(request, {"image": image, "importance": importance})
     assert [slot for _, slot in client.studio._mixes._wanted] == [1]
 
@@ -171,7 +173,7 @@ def test_paint_stops_the_exact_picture_of_an_earlier_answer(
 @pytest.mark.parametrize("step", [0, 9])
 def test_the_step_of_a_draft_is_checked(step: int) -> None:
     with pytest.raises(ValueError, match="the step of a draft is 1 to 8"):
-        protocol.Paint(stroke=1, region=(0, 1, 0, 1), draft_step=step)
+        protocol.MixLights(slot=0, number=1, step=step)
 
 
 def test_denoised_pictures_are_of_the_same_light(client: StudioClient, basis: lp.Basis) -> None:

@@ -434,11 +434,10 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
     )
     session_clients.Observers([slow]).send(patch)
     draft = np.zeros((1, 1, 3), np.float16)
-    session_clients.Observers([slow]).send(fake_answer(version=5, draft=draft, draft_step=2))
+    session_clients.Observers([slow]).send(fake_answer(version=5, draft=draft))
     for message, _ in slow._unsent:
         assert message.kind == "answer"
         assert list(message.arrays) == ["weights"]
-        assert "draft_step" not in message.fields
 
 
 # Proposals

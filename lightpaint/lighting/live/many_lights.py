@@ -32,7 +32,7 @@ from lightpaint.threads import one_thread, parallel_map
 MANY_LIGHTS = 160
 
 #: Number of lights that a round moves.
-MOVED_LIGHTS = 48
+MOVED_LIGHTS = 32
 
 #: Values of the films, lights times pixels, beyond which films of many lights have fewer pixels:
 #: each round reads them thrice.
@@ -159,7 +159,11 @@ def _renumbered(knob: Knob, number: dict[int, int]) -> Knob:
         Unknown(tuple((number[light], rgb) for light, rgb in x.columns), x.lower, x.upper)
         for x in knob.unknowns
     )
-    return replace(knob, lights=tuple(number[light] for light in knob.lights), unknowns=unknowns)
+    renumbered = replace(
+        knob, lights=tuple(number[light] for light in knob.lights), unknowns=unknowns
+    )
+    vars(renumbered)["has_any_colour"] = knob.has_any_colour  # as `cached_property` keeps it
+    return renumbered
 
 
 class ManyLights:

@@ -101,8 +101,9 @@ class AnswerUpdate(message_parts.EditState, Findings, Event, kind="answer", is_o
     under the brush. reading: what these lights give on measuring planes, if there are any.
     weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
     null for other lights; some answers under the brush have them, exact ones have them in `lights`.
-    draft: if the paint asked for one, (h, w, 3) float16, the picture of these lights under the
-    master dimmer in the painted view: every draft_step-th pixel of every draft_step-th row.
+    draft: if the paint asked for one, (rows, columns, 3) float16, the painted view under these
+    lights and the master dimmer, averaged over blocks of pixels. Stretched over the view, by
+    interpolation, and multiplied by the picture `detail` it is a draft as `mixed` has one.
     """
 
     version: int
@@ -111,7 +112,6 @@ class AnswerUpdate(message_parts.EditState, Findings, Event, kind="answer", is_o
     mode: str
     weights: Doubles
     draft: npt.NDArray[np.float16] | None = field(default=None, metadata=OPTIONAL)
-    draft_step: int | None = field(default=None, metadata=OPTIONAL)
     drives: tuple[tuple[float, ...] | None, ...] | None = field(default=None, metadata=OPTIONAL)
     reading: PlanesReading | None = field(default=None, metadata=OPTIONAL)
 

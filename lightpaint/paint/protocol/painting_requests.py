@@ -33,8 +33,8 @@ class Paint(Request, kind="paint"):
     only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
     the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
     masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
-    on top. region: of these pixels. draft_step: of a view with `has_mixes`, the step between the
-    pixels and rows of a draft in the answer; null for none.
+    on top. region: of these pixels. with_draft: whether the answer is to have a draft, of a view
+    with `has_mixes`.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {
@@ -49,13 +49,11 @@ class Paint(Request, kind="paint"):
     view: int = 0
     layer: int = PAINTING_ID
     properties: Layer | None = None
-    draft_step: int | None = None
+    with_draft: bool = False
 
     def __post_init__(self) -> None:
         if self.stroke >= 2**53:  # largest exact integer of a page
             raise ValueError("stroke is a number below 2**53")
-        if self.draft_step is not None:
-            _check_step(self.draft_step)
 
 
 @dataclass(frozen=True)
@@ -82,13 +80,8 @@ class MixLights(Request, kind="mix"):
     def __post_init__(self) -> None:
         if not 0 <= self.slot < MAX_MIX_SLOTS:
             raise ValueError(f"slot is 0 to {MAX_MIX_SLOTS - 1}")
-        _check_step(self.step)
-
-
-def _check_step(step: int) -> None:
-    """Raise ValueError for a step between the pixels of a draft that is none."""
-    if not 1 <= step <= MAX_MIX_STEP:
-        raise ValueError(f"the step of a draft is 1 to {MAX_MIX_STEP}")
+        if not 1 <= self.step <= MAX_MIX_STEP:
+            raise ValueError(f"the step of a draft is 1 to {MAX_MIX_STEP}")
 
 
 @dataclass(frozen=True)

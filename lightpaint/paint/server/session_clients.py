@@ -167,7 +167,7 @@ class Observers:
         """Send observers the events that concern them; newer events replace those that wait."""
         event = message.answer if isinstance(message, CanvasPatch) else message
         if isinstance(event, AnswerUpdate) and event.draft is not None:  # for whoever paints
-            event = replace(event, draft=None, draft_step=None)
+            event = replace(event, draft=None)
         if isinstance(event, Event) and event.is_observed:
             for client in self._clients:
                 if client.is_observer and client is not but:

@@ -13,7 +13,8 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis import Basis, array_once, scale_of
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images import block_mean, blocks_in, fitting_factor
+from lightpaint.images import block_mean, blocks_in, fitting_factor, resampled
+from lightpaint.lighting import LiveView
 from lightpaint.report import resized, thumbnail
 
 #: Approximate pixels of a thumbnail's longer side.
@@ -40,6 +41,14 @@ MAX_MIXED_PIXELS = 2**20
 #: Number of values beyond which a session opens without smoothed or kept planes: these take a walk
 #: over all planes, and the page can be used meanwhile.
 MAX_OPENING_VALUES = 2**25
+
+
+#: Light that is added to both pictures of a ratio, relative to the mean of the current look: where
+#: that is black its ratio is of noise.
+FLOOR = 1e-3
+
+#: Largest ratio of a pixel to its surroundings, as of a lamp in view.
+MAX_DETAIL = 16.0
 
 
 class PictureTable:
@@ -185,6 +194,19 @@ def plane_size(basis: Basis) -> tuple[int, int]:
 def page_plane(plane: Floats, basis: Basis) -> Floats:
     """Return a plane (h, w, 3) as a page has it. basis: as in `page_factor`."""
     return block_mean(plane, page_factor(basis))
+
+
+def look_detail(live: LiveView, look: Floats, basis: Basis) -> Floats:
+    """Return the current look (h, w, 3) over its own average over the blocks of pixels that follow
+    the brush, as large as a page has it, float32.
+
+    Any picture of these blocks, stretched over the look, gets its edges and textures by this factor
+    (joint upsampling; Kopf et al. 2007). basis: as in `page_factor`.
+    """
+    average = live.averaged(look)
+    floor = np.float32(FLOOR * look.mean() + np.finfo(np.float32).tiny)
+    whole = (look + floor) / (resampled(average, look.shape[:2]) + floor)
+    return block_mean(np.minimum(whole, np.float32(MAX_DETAIL)), page_factor(basis))
 
 
 def page_emitters(basis: Basis) -> Bools:

@@ -25,6 +25,7 @@ from lightpaint.paint.session.picture_table import (
     Picture,
     PictureTable,
     has_mixes,
+    look_detail,
     opens_plain,
     page_emitters,
     page_plane,
@@ -102,6 +103,8 @@ def offer_ground(table: PictureTable, view: Canvas, transform: ViewTransform) ->
     # Layers lie on it, and the page composes them to the bit.
     offer("ground", lambda: view.current.copy())
     offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
+    if has_mixes(view.basis):
+        offer("detail", lambda: as_halves(look_detail(view.live, view.current, view.basis)))
 
 
 def offer_layers(table: PictureTable, views: Canvases) -> None:

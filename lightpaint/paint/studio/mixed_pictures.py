@@ -30,17 +30,10 @@ from lightpaint.paint.protocol import (
     MixLights,
     Paint,
 )
-from lightpaint.paint.session.picture_table import Picture, page_factor
+from lightpaint.paint.session.picture_table import Picture, look_detail, page_factor
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.studio.exact_answers import OutdatedError
 from lightpaint.progress import cancellable
-
-#: Light that is added to both pictures of a ratio, relative to the mean of the current look: where
-#: that is black its ratio is of noise.
-FLOOR = 1e-3
-
-#: Largest ratio of a pixel to its surroundings, as of a lamp in view.
-MAX_DETAIL = 16.0
 
 
 class DraftPictures:
@@ -69,11 +62,8 @@ class DraftPictures:
         """
         live, look = view.live, view.current
         if self._known is None or self._known[0] is not live or self._known[1] is not look:
-            average = live.averaged(look)
-            floor = np.float32(FLOOR * look.mean() + np.finfo(np.float32).tiny)
-            whole = (look + floor) / (resampled(average, look.shape[:2]) + floor)
-            detail = block_mean(np.minimum(whole, MAX_DETAIL), page_factor(view.basis))
-            whole = np.ascontiguousarray(detail.transpose(2, 0, 1), np.float32)
+            detail = look_detail(live, look, view.basis)
+            whole = np.ascontiguousarray(detail.transpose(2, 0, 1))
             self._known = live, look, {1: whole}
         details = self._known[2]
         if step not in details:
@@ -140,20 +130,17 @@ class MixedPictures:
     def with_draft(self, paint: Paint, messages: list[Message]) -> list[Message]:
         """Return the messages that answer some paint, with a draft in the answer if it asks for
         one, which would come later, and behind the next paint, if the page asked for it afterwards.
+
+        It has few pixels: the page multiplies the details, which it has, back.
         """
-        if paint.draft_step is None:
+        if not paint.with_draft:
             return messages
         session = self._access.session
         with self._lock:
             self._wanted.pop((paint.view, ANSWER_SLOT), None)
         weights = session.requests.output(session.weights, session.basis.is_fixed)
-        draft = self._draft(paint.view, weights, paint.draft_step)
-        return [
-            replace(x, draft=draft, draft_step=paint.draft_step)
-            if isinstance(x, AnswerUpdate)
-            else x
-            for x in messages
-        ]
+        draft = as_halves(session.views[paint.view].live.draft(weights))
+        return [replace(x, draft=draft) if isinstance(x, AnswerUpdate) else x for x in messages]
 
     def _draft(self, view: int, weights: Doubles, step: int) -> Picture:
         """Return the draft of a lighting in a view. weights: (n, 3). step: as in a request."""

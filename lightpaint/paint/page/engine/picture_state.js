@@ -23,8 +23,8 @@ export class PictureState {
     /** @type {Display | null} */
     this.display = null;
     this.weights = new Float64Array();
-    /** The picture of the weights that are being taken, where it has come with them.
-     * @type {{halves: Uint16Array, step: number} | null} */
+    /** The small picture of the weights that are being taken, where it has come with them.
+     * @type {import("./draft_detail.js").SmallPicture | null} */
     this.draft = null;
     /** Whether lights have moved since the current look. */
     this.haveLightsMoved = false;
@@ -56,9 +56,9 @@ export class PictureState {
     return !solutionWeights && !visibleLights?.includes(false);
   }
 
-  /** The step between the pixels of the draft that an answer to paint is to have; null for none. */
-  get draftStep() {
-    return this.hasMixes && this.showsAnswer ? this.mixes.draftStep : null;
+  /** Whether an answer to paint is to have a draft. */
+  get wantsDrafts() {
+    return this.hasMixes && this.showsAnswer && this.mixes.detail !== null;
   }
 
   /** Number of planes of the view before the planes of compared looks. */
@@ -78,7 +78,7 @@ export class PictureState {
     this.weights = Float64Array.from(weights);
     const { draft } = message.arrays;
     const halves = /** @type {Uint16Array | undefined} */ (draft?.data);
-    this.draft = halves ? { halves, step: message.draft_step } : null;
+    this.draft = halves ? { halves, size: [draft.shape[0], draft.shape[1]] } : null;
     this.showWeights();
     this.draft = null;
     // The exact answer comes when the brush rests, and should be drawn sharply.

@@ -134,7 +134,7 @@ export class SessionMirror extends PictureState {
       this.strokes = new StrokeSender(this.host, requestState, reportLoss);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
       this.strokes.onSettled = () => this.layers.adopt(false);
-      this.strokes.draftStep = () => this.draftStep;
+      this.strokes.wantsDrafts = () => this.wantsDrafts;
       this.strokes.onBeforeSend = () => this.emit('send', {});
     }
     this.strokes.paintOn(this.canvas, view);
@@ -144,6 +144,7 @@ export class SessionMirror extends PictureState {
     this.knowsPresent = false;
     this.loader.forget();
     this.mixes.forget();
+    this.mixes.setDetail(null);
     this.setLut(this.lut);
   }
 
@@ -251,7 +252,8 @@ export class SessionMirror extends PictureState {
     const names = wantedPictures(count, display, view, loader.resources);
     this.mixes.follow(view, display?.clean ?? true);
     const ground = this.layers.isPlain ? null : nameInView('ground', view);
-    loader.setWanted([...names, ['ground', ground]]);
+    const detail = this.hasMixes ? nameInView('detail', view) : null;
+    loader.setWanted([...names, ['ground', ground], ['detail', detail]]);
     if ((display?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
   }
 
@@ -272,6 +274,7 @@ export class SessionMirror extends PictureState {
     } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
     else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
     else if (slot === 'ground') this.layers.setGround(/** @type {Float32Array} */ (data));
+    else if (slot === 'detail') this.mixes.setDetail(/** @type {Uint16Array} */ (data));
     else if (slot === 'albedo') canvas.albedo = /** @type {Uint16Array} */ (data);
     else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
     else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));

@@ -5,6 +5,7 @@
  * Each slot of the view's planes shows one lighting. Drafts come at once, with the answer to paint or
  * one in flight for each slot; the exact picture comes after a pause without changes.
  */
+import { DraftDetail } from './draft_detail.js';
 import { nameInView } from './message_frames.js';
 import { repeatPixels } from '../../../viewer/drawing/coarse_planes.js';
 import { toFloats } from '../../../viewer/drawing/half_floats.js';
@@ -13,6 +14,7 @@ import { COMPARED_COUNT } from './picture_slots.js';
 /** @import { Message } from './message_frames.js' */
 /** @import { Screen } from './picture_canvas.js' */
 /** @import { Host } from './socket_host.js' */
+/** @import { SmallPicture } from './draft_detail.js' */
 /** number: of the last lighting; shown: of the lighting whose picture is here. isBusy: whether a draft
  * is in flight; isNew: whether the next has been asked for. halves: the picture, of every step-th
  * pixel of every step-th row.
@@ -42,6 +44,9 @@ export class SessionMixes {
     /** @type {Map<number, Slot>} */
     this.slots = new Map();
     this.number = 0;
+    /** The details of drafts that come with answers; null before they are here.
+     * @type {DraftDetail | null} */
+    this.detail = null;
     /** The last that `lightsAt` has fetched. @type {{name: string, values: Float32Array} | null} */
     this.lights = null;
     this.isFetching = false;
@@ -49,7 +54,7 @@ export class SessionMixes {
   }
 
   /** Show a lighting in a slot. @param {number} index @param {Float64Array} weights (n, 3)
-   * @param {{halves: Uint16Array, step: number} | null} [draft] of it, if it is here */
+   * @param {SmallPicture | null} [draft] of it, if it is here */
   show(index, weights, draft = null) {
     const known = this.slots.get(index);
     if (known && isSame(known.weights, weights)) return;
@@ -61,12 +66,19 @@ export class SessionMixes {
     else this.ask(index, slot);
   }
 
-  /** Show the draft that has come with a lighting. @param {number} index @param {Slot} slot
-   * @param {{halves: Uint16Array, step: number}} draft */
-  showDraft(index, slot, { halves, step }) {
+  /** Show the draft that has come with a lighting, unless the details have gone meanwhile.
+   * @param {number} index @param {Slot} slot @param {SmallPicture} draft */
+  showDraft(index, slot, draft) {
+    if (!this.detail) return this.ask(index, slot);
     slot.isNew = false;
     this.note(index, slot);
-    this.setPicture(index, slot, halves, step, slot.number);
+    this.setPicture(index, slot, this.detail.enlarge(draft), this.detail.step, slot.number);
+  }
+
+  /** Take the details of drafts; null where these are of another view.
+   * @param {Uint16Array | null} halves of all pixels */
+  setDetail(halves) {
+    this.detail = halves && new DraftDetail(halves, this.screen.planeSize, this.draftStep);
   }
 
   /** Ask for the pictures of all slots again, since planes have changed. */

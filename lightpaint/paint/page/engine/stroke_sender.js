@@ -26,9 +26,8 @@ import { plainLayer } from './layers/layer_list.js';
  * @typedef {{select: Select, arrays: Arrays, onAnswer: (isTaken: boolean) => void}} PendingSelection */
 
 export class StrokeSender {
-  /** Returns the step of drafts that answers to paint are to have; null for none.
-   * @type {() => number | null} */
-  draftStep = () => null;
+  /** Returns whether answers to paint are to have drafts. @type {() => boolean} */
+  wantsDrafts = () => false;
 
   /** Called before changes of the stroke in progress are sent; may bring further ones. */
   onBeforeSend = () => {};
@@ -258,13 +257,13 @@ export class StrokeSender {
       this.send('change_layers', next.change, {}, next);
     } else if (next && 'select' in next) this.send('select', next.select, next.arrays, next);
     else if (next)
-      this.send('paint', { ...paintFields(next), draft_step: this.draftStep() }, cutArrays(next), next);
+      this.send('paint', { ...paintFields(next), with_draft: this.wantsDrafts() }, cutArrays(next), next);
     else if (this.currentStroke?.dirty) {
       const { stroke, view, dirty, canvas, layerOf } = this.currentStroke;
       this.currentStroke.dirty = null;
       this.currentStroke.isKnown = true;
       const fields = {
-        ...{ stroke, view, region: dirty, is_final: false, draft_step: this.draftStep() },
+        ...{ stroke, view, region: dirty, is_final: false, with_draft: this.wantsDrafts() },
         ...layerFields(layerOf()),
       };
       this.send('paint', fields, canvas.copy(dirty), null);
