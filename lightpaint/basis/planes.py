@@ -293,6 +293,8 @@ class _LightOf:
     def __init__(self, planes: PlanesBase, where: slice | Indices) -> None:
         self._planes, self._where = planes, where
         self._lit = planes.lit_entries(where)
+        if self._lit is None:
+            self.dense()  # now, or each channel's thread would read it
 
     def dense(self) -> Floats:
         """Return all of it, (n, p, 3)."""
@@ -444,9 +446,9 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     to 10⁻⁶ of M, is far below the round-off of half floats; sums over blocks are float64 all the
     same.
     """
-    if planes.count < MIN_SINGLE_LIGHTS or not planes.is_noisy:
-        return BLOCK_PIXELS, np.float64
-    return BLOCK_PIXELS // (2 if planes.count < LARGE_BLOCK_LIGHTS else 4), np.float32
+    is_single = planes.count >= MIN_SINGLE_LIGHTS and planes.is_noisy
+    parts = 4 if planes.count >= LARGE_BLOCK_LIGHTS else 2 if is_single else 1
+    return BLOCK_PIXELS // parts, np.float32 if is_single else np.float64
 
 
 def _release_after_walk(planes: PlanesBase) -> None:
