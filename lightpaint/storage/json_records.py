@@ -7,7 +7,7 @@ import math
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, asdict, fields, is_dataclass
+from dataclasses import MISSING, Field, asdict, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -29,6 +29,18 @@ _Record = TypeVar("_Record")
 
 #: Returns the types of a dataclass's fields by name, once for the many records of a file.
 _kinds_of: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+
+
+@cache
+def _parts_of(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return the origin and the arguments of an annotation, once for all values of a file."""
+    return get_origin(kind), get_args(kind)
+
+
+@cache
+def _fields_of(kind: Any) -> tuple[Field[Any], ...]:
+    """Return the fields of a dataclass, once for the many records of a file."""
+    return fields(kind)
 
 
 def strict_json(text: str) -> Any:
@@ -112,7 +124,7 @@ def read_record(
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
     kinds, values = _kinds_of(kind), dict[str, Any]()
-    record_fields = fields(kind)  # type: ignore[arg-type]
+    record_fields = _fields_of(kind)
     names = {field.name for field in record_fields}
     if not others and (unknown_keys := [key for key in data if key not in names]):
         raise ValueError(f"the key {unknown_keys[0]!r} is unknown")
@@ -144,7 +156,7 @@ def fields_of(record: Any, *optional: str) -> dict[str, Any]:
 
 def _read(kind: Any, value: Any, is_exact: bool) -> Any:
     """Return `value` converted to the annotation `kind`. Raises TypeError if it does not match."""
-    outer, inner = get_origin(kind), get_args(kind)
+    outer, inner = _parts_of(kind)
     if kind is Any:
         return value
     # Types are compared exactly, since isinstance would accept True as the number 1.

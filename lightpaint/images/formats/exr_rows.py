@@ -34,14 +34,18 @@ LINES = {0: 1, 2: 1, 3: 16}
 
 TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
-#: Number of bytes that is enough for most headers, and maximum size of a header.
-FIRST_READ, MAX_HEADER = 2**18, 2**26
+#: Number of bytes that is enough for most headers, of a thousand lights too, and maximum size of a
+#: header.
+FIRST_READ, MAX_HEADER = 2**21, 2**26
 
 #: Number of bytes of a part read at a time when many rows are read.
 READ_BYTES = 2**22
 
 #: Header of a chunk: its part, its first line, and the number of bytes that follow.
 HEAD = struct.Struct("<iii")
+
+#: The length of an attribute.
+INT = struct.Struct("<i")
 
 #: Version number of a file; the flag for names longer than LONGEST_NAME characters; and that
 #: length.
@@ -212,15 +216,18 @@ class RowFile:
 
 def _attributes(head: bytes, position: int) -> tuple[dict[str, tuple[str, bytes]], int]:
     """Return name → (type, value) of the attributes of the header at `position`, and its end."""
-    attributes = {}
+    attributes, length = {}, len(head)
+    find, size_at = head.index, INT.unpack_from
     while head[position]:
-        name, position = _text(head, position)
-        kind, position = _text(head, position)
-        (size,) = struct.unpack_from("<i", head, position)
-        if not 0 <= size <= len(head) - position - 4:
+        middle = find(b"\0", position)
+        end = find(b"\0", middle + 1)
+        (size,) = size_at(head, end + 1)
+        begin = end + 1 + INT.size
+        if not 0 <= size <= length - begin:
             raise ValueError("an attribute is longer than the file")
-        attributes[name] = kind, head[position + 4 : position + 4 + size]
-        position += 4 + size
+        kind = head[middle + 1 : end].decode()
+        attributes[head[position:middle].decode()] = kind, head[begin : begin + size]
+        position = begin + size
     return attributes, position + 1
 
 
