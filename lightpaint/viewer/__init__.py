@@ -23,22 +23,23 @@ _IMPORT = re.compile(
 _EXPORT = re.compile(
     r"^export\s+(?=(?:async\s+)?(?:const|class|function\*?)\s+(?P<name>[\w$]+))", re.MULTILINE
 )
+#: What must not come before a word is looked for behind it: a pattern that begins with a text is
+#: found ten times as fast, and a painter's page waits for this.
 _EXPORT_LIST = re.compile(
-    r"(?<![\w$.])export\s*\{(?P<names>[^}]*)\}"
+    r"export(?<![\w$.]export)\s*\{(?P<names>[^}]*)\}"
     r"(?:\s*from\s*(?P<q>['\"])(?P<path>[^'\"]+)(?P=q))?;?"
 )
 _SHEET_IMPORT = re.compile(r'^@import "(?P<path>[^"]+)";$', re.MULTILINE)
 #: The space before a pseudo-class of a descendant, which rcssmin 1.3.0 drops within `@container`.
 _DESCENDANT = re.compile(r"(?<=[\w)\]]) (?=:(?:has|is|not|where)\()")
-_DYNAMIC = re.compile(r"(?<![\w$.])import\(")
+_DYNAMIC = re.compile(r"import\((?<![\w$.]import\()")
 _PATHS = re.compile(r"""\(\s*["'](\.[./\w-]*\.js)["']""")
 _COMMENT = re.compile(
     r"^[ \t]*(?:/\*(?!!)(?:(?!\*/)[\s\S])*\*/[ \t]*(?=\n|\Z)|//[^\n]*(?=\n|\Z))", re.MULTILINE
 )
 _TYPE = re.compile(r"/\*\*\s*@(?:type|param|returns|this|template)\b[\s\S]*?\*/ ?")
-_NOT_UNDERSTOOD = re.compile(
-    r"^\s*(?:import|export)(?:\s+[\w$*]|\s*[{'\"])|\bimport\.meta\b", re.MULTILINE
-)
+_NOT_UNDERSTOOD = re.compile(r"^[^\S\n]*(?:import|export)(?:\s+[\w$*]|\s*[{'\"])", re.MULTILINE)
+_META = re.compile(r"import\.meta\b(?<!\wimport\.meta)")
 
 
 class BundleError(Exception):
@@ -164,7 +165,7 @@ def _as_constant(path: str, number: dict[str, int]) -> str:
     exports += [match["name"] for match in _EXPORT.finditer(text)]
     text = _EXPORT.sub("", text)
     text = _DYNAMIC.sub(f'loaded.bind(null, "{path}")(', text)
-    if unknown := _NOT_UNDERSTOOD.search(text):
+    if unknown := _NOT_UNDERSTOOD.search(text) or _META.search(text):
         line = text[unknown.start() :].strip().splitlines()[0]
         raise BundleError(
             f"{path}: cannot bundle `{line[:60]}`: write it as another import or export"
