@@ -22,14 +22,17 @@ from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.answer.certificate import Certificate, Software
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.linear_problem import LinearProblem
+from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
     ReducedProblem,
     reduced_problems,
+    solve_reduced,
 )
 from lightpaint.lighting.unknowns.reduction import Reduction, only_knobs
+from lightpaint.lighting.unknowns.some_lights import parts_of
 from lightpaint.lighting.unknowns.white_mixes import Multipliers, solve_on_locus
 
 #: Sizes beyond K that are tried, so that people see the gain of a few more lights.
@@ -41,7 +44,26 @@ MIN_GAIN = 1e-9
 #: Gradient, with a unit diagonal and relative to b, from which a constraint has an effect.
 MIN_PULL = 1e-7
 
+#: Number of lights from which knobs that depend on no others are solved for a few at a time.
+MANY_APART = 160
+
 _Problem = TypeVar("_Problem", bound=LinearProblem)
+
+
+def nearest_allowed(power: Doubles, reduction: Reduction, weights: Doubles) -> Doubles:
+    """Return the allowed weights (n, 3) of least Σᵢ powerᵢ (wᵢ − weightsᵢ)²; all are (n, 3).
+
+    Without requirements, which couple all lights, each knob has a problem of its own. The matrix of
+    all together takes seconds and a quarter of a gigabyte for a thousand lights.
+    """
+    if len(weights) < MANY_APART or reduction.requirements is not None:
+        return solve_reduced(pull_to_current(power, weights), reduction, weights).weights
+    nearest = reduction.fixed_weights.copy()
+    for some in parts_of(reduction):
+        near = weights[some.lights]
+        pull = pull_to_current(power[some.lights], near)
+        nearest[some.lights] = solve_reduced(pull, some.reduction, near).weights
+    return nearest
 
 
 class _Trials:

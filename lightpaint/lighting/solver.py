@@ -20,6 +20,7 @@ from lightpaint.lighting.linear_solve import (
     LinearAnswer,
     at_better_slots,
     at_slots,
+    nearest_allowed,
     solve_linear,
     solve_mixed,
     solve_squares,
@@ -385,8 +386,7 @@ def nearest_to_current(problem: Problem) -> Doubles:
         nearest = reduced_problem.nearest_weights(reduction, current)
         if np.allclose(nearest, current, rtol=1e-9, atol=0):
             return nearest
-    pull = pull_to_current(problem.basis.power, current)
-    return reduced_problem.solve_reduced(pull, reduction, current).weights
+    return nearest_allowed(problem.basis.power, reduction, current)
 
 
 def _problem_of_blocks(

@@ -6,16 +6,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.lighting import linear_solve
 from lightpaint.lighting.constraints.constraint_table import Constraints, Requirements
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live import live_solver as live_module
 from lightpaint.lighting.live import many_lights
 from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.live.many_lights import SomeLights
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
+from lightpaint.lighting.unknowns import some_lights
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.unknowns.some_lights import SomeLights
 from lightpaint.target.painted_target import Target
 
 LIGHTS, SIZE = 24, (30, 40)
@@ -189,3 +191,28 @@ def test_the_unknowns_of_some_lights_are_those_that_they_have_among_all(make_bas
     whole_x[[i for k in some.places for i in whole.places[k]]] = x
     expected = whole.weights(whole_x)
     np.testing.assert_array_equal(some.reduction.weights(x), expected[some.lights])
+
+
+def test_the_nearest_allowed_weights_are_found_a_few_lights_at_a_time(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    basis = _basis(make_basis)
+    constraints = Constraints.of(
+        light={
+            "light 2": {"limits": {"max": "40%"}},
+            "light 7": {"lock": True},
+            "light 8": {"color": [1.0, 0.8, 0.5]},
+            "light 20": {"limits": {"min": 0.1, "max": 0.2}},
+        },
+        tie=[{"lights": ["light 3", "light 9", "light 21"]}],
+    )
+    reduction, rng = reduce_to(constraints, basis.lights), np.random.default_rng(0)
+    power, weights = rng.uniform(0.1, 1, (LIGHTS, 3)), rng.uniform(-0.2, 1, (LIGHTS, 3))
+    power[5], power[6, 1] = 0, 0  # a light that reaches nothing, and a channel of another
+    together = linear_solve.nearest_allowed(power, reduction, weights)
+    monkeypatch.setattr(linear_solve, "MANY_APART", 1)
+    monkeypatch.setattr(some_lights, "KNOBS_APART", 4)
+    apart = linear_solve.nearest_allowed(power, reduction, weights)
+    # Both are optimal to 1e-12 of their scale.
+    np.testing.assert_allclose(apart, together, rtol=1e-9, atol=1e-11)
+    assert abs(apart - weights).max() > 0.1

@@ -34,7 +34,7 @@ from lightpaint.lighting.constraints.light_constraints import (
     start_weights,
 )
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.linear_solve import at_slots, solve_linear
+from lightpaint.lighting.linear_solve import at_slots, nearest_allowed, solve_linear
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveDifference, LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
@@ -44,13 +44,12 @@ from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.weight_penalty import (
     PaintTerms,
     is_spoilt_by_contrast,
-    pull_to_current,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns import white_mixes
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, light_of_emitters_seen
-from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
+from lightpaint.lighting.unknowns.reduced_problem import nearest_weights
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.threads import one_thread
 
@@ -552,4 +551,4 @@ def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) 
     allowed = nearest_weights(reduction, weights)
     if reduction.requirements is None and np.allclose(allowed, weights, rtol=ROUND_OFF, atol=0):
         return allowed  # without a solve, which takes a second for a thousand lights
-    return solve_reduced(pull_to_current(_power(views), weights), reduction, weights).weights
+    return nearest_allowed(_power(views), reduction, weights)
