@@ -29,18 +29,13 @@ _Record = TypeVar("_Record")
 
 #: Returns the types of a dataclass's fields by name, once for the many records of a file.
 _kinds_of: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+_fields_of: Callable[[Any], tuple[Field[Any], ...]] = cache(fields)
 
 
 @cache
 def _parts_of(kind: Any) -> tuple[Any, tuple[Any, ...]]:
     """Return the origin and the arguments of an annotation, once for all values of a file."""
     return get_origin(kind), get_args(kind)
-
-
-@cache
-def _fields_of(kind: Any) -> tuple[Field[Any], ...]:
-    """Return the fields of a dataclass, once for the many records of a file."""
-    return fields(kind)
 
 
 def strict_json(text: str) -> Any:

@@ -233,7 +233,7 @@ class DeferredSquares(pixel_loss.Squares):
             self._arrays = made.image, made.weight, made.share
 
     @cached_property
-    def _arrays(self) -> tuple[Doubles, Doubles, Doubles]:
+    def _arrays(self) -> tuple[Floats, Floats, Floats]:
         x, pixels = self._lit.predicted(self._weights), self._lit.pixels
         image, weight = pixels.squares(x, from_clipping=False)
         size = self._lit.planes.size

@@ -1,4 +1,4 @@
-"""Some of many lights as a reduction of their own, of which the others are no part."""
+"""A reduction of a few of many lights, without the others."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -120,7 +120,7 @@ class Noise:
         the squares of few half differences.
         """
         steady = self.hidden == 0
-        return self.power * steady[:, :, None] * steady[:, None, :]
+        return np.asarray(self.power * steady[:, :, None] * steady[:, None, :])
 
     @property
     def is_hidden(self) -> Bools:
