@@ -23,7 +23,6 @@ from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.plane_results import array_name, make_once
 from lightpaint.images import (
     Quality,
-    SurfaceFilter,
     block_mean,
     box_mean,
     denoised,
@@ -245,19 +244,12 @@ def _denoise_indirect(
             return along_surfaces(indirect)
         is_coarse = quality == "coarse" and min(along_surfaces.size) >= COARSE_BLOCK
         if is_coarse and along_surfaces.is_quick and basis.knows_noise:
-            clean = _denoise_coarsely(basis, indirect, along_surfaces, factor)
+            coarse_factor = factor * COARSE_BLOCK
+            small = _denoise_whole(basis, block_mean(indirect, COARSE_BLOCK), coarse_factor, "fast")
+            clean = along_surfaces.enlarged(small, COARSE_BLOCK)
             # What a mirror shows has edges that its surface has not.
             return blend_where_sure(indirect, noise, clean)
     return _denoise_whole(basis, indirect, factor, quality)
-
-
-def _denoise_coarsely(
-    basis: Basis, picture: Floats, along_surfaces: SurfaceFilter, factor: int
-) -> Floats:
-    """Return a picture, (h, w, 3), denoised in blocks of pixels and averaged along surfaces."""
-    coarse_factor = factor * COARSE_BLOCK
-    small = _denoise_whole(basis, block_mean(picture, COARSE_BLOCK), coarse_factor, "fast")
-    return along_surfaces.enlarged(small, COARSE_BLOCK)
 
 
 def _within_neighbours(clean: Floats, raw: Floats) -> Floats:

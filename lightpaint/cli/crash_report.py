@@ -29,14 +29,6 @@ def report_fault(command: str, error: BaseException, arguments: Sequence[str]) -
     """
     message = one_line(str(error), limit=MAX_ERROR_LENGTH)
     error_text = f"{type(error).__name__}: {message}" if message else type(error).__name__
-    path = _write_details(_details(error, arguments))
-    details_note = f"the details are in {path}" if path else "the details could not be written"
-    lines.complain(command, f"a bug in lightpaint: {error_text}; {details_note}")
-    return FAULT
-
-
-def _details(error: BaseException, arguments: Sequence[str]) -> str:
-    """Return all that helps to find the bug, without control characters from files."""
     header = (
         f"lightpaint {__version__}, Python {platform.python_version()}, {platform.platform()}",
         f"command: {visible(repr(['lightpaint', *arguments]))}",
@@ -45,7 +37,10 @@ def _details(error: BaseException, arguments: Sequence[str]) -> str:
     lines_of_traceback = (
         line for text in traceback.format_exception(error) for line in text.splitlines()
     )
-    return "\n".join([*header, "", *map(visible, lines_of_traceback), ""])
+    path = _write_details("\n".join([*header, "", *map(visible, lines_of_traceback), ""]))
+    details_note = f"the details are in {path}" if path else "the details could not be written"
+    lines.complain(command, f"a bug in lightpaint: {error_text}; {details_note}")
+    return FAULT
 
 
 def _libraries() -> list[str]:

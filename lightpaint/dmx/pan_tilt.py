@@ -55,7 +55,11 @@ def _aimed(fixture: RigFixture, wanted: Mapping[str, Position]) -> tuple[RigFixt
         direction = np.sum([unit(wanted[name]) for name in head.lights], axis=0)
         if not np.linalg.norm(direction) > 0:
             continue
-        angles = angles_for(_with_known(head, known), direction, rest)
+        axes = [
+            replace(x, degrees=(known[x.channel],) * 2) if x.channel in known else x
+            for x in head.axes
+        ]
+        angles = angles_for(replace(head, axes=tuple(axes)), direction, rest)
         for axis, degrees in zip(head.axes, angles, strict=True):
             if axis.channel not in known:
                 level = axis.level_of(degrees)
@@ -76,14 +80,6 @@ def _aimed(fixture: RigFixture, wanted: Mapping[str, Position]) -> tuple[RigFixt
     if off > UNNOTICED:
         return aimed, f"{fixed[0].name!r} has no pan and tilt: turn it by {off:.3g}° by hand"
     return aimed, ""
-
-
-def _with_known(head: RigHead, known: Mapping[int, float]) -> RigHead:
-    """Return a head without freedom about axes that another head has set, by their channels."""
-    axes = [
-        replace(x, degrees=(known[x.channel],) * 2) if x.channel in known else x for x in head.axes
-    ]
-    return replace(head, axes=tuple(axes))
 
 
 def turned(head: RigHead, angles: Sequence[float]) -> Doubles:

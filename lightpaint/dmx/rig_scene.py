@@ -378,7 +378,10 @@ def room_of_show(path: Path, models: Sequence[PlacedModel]) -> RoomFiles:
                 remarks.append(f"{file} is not in {path.name}: left out")
                 continue
             try:
-                mesh = _loaded(trimesh, archive.read(member), file)
+                scene = trimesh.load_scene(
+                    io.BytesIO(archive.read(member)), file_type=Path(file).suffix[1:].lower()
+                )
+                mesh = scene.to_mesh()
             except Exception as error:  # any kind, of a library that reads strangers' files
                 remarks.append(f"{file} cannot be read: {first_line(error)}")
                 continue
@@ -413,12 +416,6 @@ def _trimesh() -> Any:
     except ImportError:
         return None
     return trimesh
-
-
-def _loaded(trimesh: Any, data: bytes, file: str) -> Any:
-    """Return a model as one mesh, in metres, y up."""
-    scene = trimesh.load_scene(io.BytesIO(data), file_type=Path(file).suffix[1:].lower())
-    return scene.to_mesh()
 
 
 def _copies(mesh: Any, places: Sequence[Doubles]) -> tuple[Doubles, npt.NDArray[np.int32]]:

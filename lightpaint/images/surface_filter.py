@@ -54,7 +54,11 @@ class SurfaceFilter:
         filtered = np.empty((*self.size, 3), np.float32)
 
         def fill(band: "_Band") -> None:
-            filtered[band.top : band.bottom] = self._filtered(band, image)
+            albedo = self._albedo[:, band.top : band.bottom]
+            rows = slice(max(band.top - self.radius, 0), band.bottom + self.radius)
+            light = _planar(image[rows]) / self._albedo[:, rows]
+            mean = band.sums(self._framed(light, rows.start, band)) / band.total
+            filtered[band.top : band.bottom] = np.moveaxis(mean * albedo, 0, -1)
 
         parallel_map(fill, self._weighed_bands if self.is_quick else self._bands())
         return filtered
@@ -86,14 +90,6 @@ class SurfaceFilter:
         if weighed:
             parallel_map(lambda band: band.weights, bands)
         return bands
-
-    def _filtered(self, band: "_Band", image: Floats) -> Floats:
-        """Return the filtered rows of a band, (rows, w, 3)."""
-        albedo = self._albedo[:, band.top : band.bottom]
-        rows = slice(max(band.top - self.radius, 0), band.bottom + self.radius)
-        light = _planar(image[rows]) / self._albedo[:, rows]
-        mean = band.sums(self._framed(light, rows.start, band)) / band.total
-        return np.moveaxis(mean * albedo, 0, -1)
 
     def _framed(self, planes: Floats, first: int, band: "_Band") -> Floats:
         """Return planes that start at row `first`, padded with zeros to all that `radius` reaches

@@ -175,7 +175,13 @@ def _add_wishes(
         below = -matrix * (1 + point_error)
         rows.add("max", name, wishes.most, below, -wishes.most, size=wishes.most)
     for ratio in wishes.ratios:
-        other = illuminance.matrix[_other_plane(illuminance, plane, ratio.to)]
+        names = [x.name for x in illuminance.planes]
+        if ratio.to not in names:
+            raise ConstraintError(
+                f"plane {plane.name!r} has a ratio to {ratio.to!r}, which is not a plane: there is "
+                f"{', '.join(names)}"
+            )
+        other = illuminance.matrix[illuminance.points_of(ratio.to)]
         above = sure_mean - ratio.at_least * other.mean(axis=0, keepdims=True)
         rows.add("ratio", name, ratio.at_least, above, 0.0, size=size, to=ratio.to)
 
@@ -271,15 +277,3 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
             f"{purpose} needs the power of each lamp, and the power of {unknown[0]!r}{more} is "
             "unknown: add watts to its table in the lights file, or lock = true if it is to stay"
         )
-
-
-def _other_plane(
-    illuminance: photometry.Illuminance, plane: photometry.MeasuringPlane, to: str
-) -> slice:
-    names = [x.name for x in illuminance.planes]
-    if to not in names:
-        raise ConstraintError(
-            f"plane {plane.name!r} has a ratio to {to!r}, which is not a plane: there is "
-            f"{', '.join(names)}"
-        )
-    return illuminance.points_of(to)

@@ -125,13 +125,9 @@ def requirements_within_reach(
     """Return the requirements, as much of them as lights can reach, and the share of each wish that
     had to be given up, (w,). reduction: of the lights, without requirements.
     """
-    shares = _shares_given_up(wished, reduction)
-    return _lowered(wished, shares), shares
-
-
-def _shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
     own = reduction.at_middle_colors()
-    return shares_given_up(wished, own.with_requirements(wished.requirements))
+    shares = shares_given_up(wished, own.with_requirements(wished.requirements))
+    return _lowered(wished, shares), shares
 
 
 def _lowered(wished: WishedLight, shares: Doubles) -> Requirements:

@@ -49,7 +49,13 @@ def from_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     (length,) = struct.unpack_from("<I", frame)
     if length > min(MAX_TEXT, len(frame) - 4):
         raise PaintError(f"a frame that speaks of {length} bytes of JSON and has fewer")
-    content = _parse_json(bytes(frame[4 : 4 + length]))
+    text = bytes(frame[4 : 4 + length])
+    try:
+        content = strict_json(text.decode())
+    except (ValueError, UnicodeDecodeError) as error:
+        raise PaintError(one_line(f"a message that is not JSON: {error}")) from None
+    if not isinstance(content, dict):
+        raise PaintError("a message that is not an object")
     view, position, buffers = memoryview(frame), 4 + length + -(4 + length) % 8, []
     for shape, kind in _buffer_types(content):
         size = math.prod(shape) * np.dtype(kind).itemsize
@@ -116,16 +122,6 @@ def _check_lengths(kind: str, value: Any) -> None:
             )
         for item in [*value, *value.values()] if isinstance(value, dict) else value:
             _check_lengths(kind, item)
-
-
-def _parse_json(text: bytes) -> dict[str, Any]:
-    try:
-        content = strict_json(text.decode())
-    except (ValueError, UnicodeDecodeError) as error:
-        raise PaintError(one_line(f"a message that is not JSON: {error}")) from None
-    if not isinstance(content, dict):
-        raise PaintError("a message that is not an object")
-    return content
 
 
 def _buffer_types(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:

@@ -69,7 +69,11 @@ class RoomRays:
         self.size = float(np.linalg.norm(self.bounds[1] - self.bounds[0])) or 1.0
         self.up = np.array(scene.up)
         self.eye = np.array(scene.eye(loaded), float).ravel()
-        self._enclosing = self._shapes_around(self.eye)
+        # The shapes of which the eye sees the back sides.
+        around = _directions(16 * DIRECTIONS)
+        hits = self.first_hits(np.tile(self.eye, (len(around), 1)), around)
+        is_behind = (hits.shape >= 0) & ((hits.normal * around).sum(axis=1) > 0)
+        self._enclosing = np.unique(hits.shape[is_behind])
 
     def indices(self, name: str) -> list[int]:
         """Return the indices of the shapes with a name."""
@@ -129,13 +133,6 @@ class RoomRays:
         is_behind = (hits.shape >= 0) & ((hits.normal * around).sum(axis=1) > 0)
         is_behind &= ~np.isin(hits.shape, self._enclosing)
         return np.asarray(is_behind.reshape(-1, DIRECTIONS).mean(axis=1) >= SOLID_SHARE)
-
-    def _shapes_around(self, place: Doubles) -> Indices:
-        """Return the shapes of which a place sees the back sides."""
-        around = _directions(16 * DIRECTIONS)
-        hits = self.first_hits(np.tile(place, (len(around), 1)), around)
-        is_behind = (hits.shape >= 0) & ((hits.normal * around).sum(axis=1) > 0)
-        return np.unique(hits.shape[is_behind])
 
 
 def _directions(count: int) -> Doubles:

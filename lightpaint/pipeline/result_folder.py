@@ -97,7 +97,7 @@ class ResultFolder:
             return
         if record is None:
             raise self._unrecorded(existing_files)
-        if not self._is_own(record):
+        if not (self._belongs_to_lighting or set(record.answers) <= set(self._answers)):
             raise OutputError(
                 f"{self.folder} holds the answer to {self._names_of(record.answers)}, not to "
                 f"{self._names_of(self._answers)}: ",
@@ -141,10 +141,6 @@ class ResultFolder:
         """True if the new files belong to the lighting in the folder."""
         lighting = self.folder / "lighting.json"
         return self.adds_to is not None and lighting.exists() and self.adds_to.samefile(lighting)
-
-    def _is_own(self, record: _Record) -> bool:
-        """Return True if the existing results answer nothing else."""
-        return self._belongs_to_lighting or set(record.answers) <= set(self._answers)
 
     def _obsolete(self, record: _Record | None) -> list[Path]:
         """Return the files that disappear when new results appear, unless these replace them."""

@@ -296,7 +296,13 @@ def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> F
     """Return a light of a group, at some place of its freedom."""
     group = light.group
     freedom, places = _freedom_of_new(scene, group.freedom, paths, seed)
-    position = _first_position(light, freedom, places, paths, seed)
+    tested = places.random(TESTED, np.random.default_rng(seed))
+    is_free = paths.usable(tested, None if freedom.clear is None else 0.9 * freedom.clear)
+    if light.group.is_kept_out_of_view(is_panel=light.kind == "panel"):
+        is_free &= ~paths.in_view(tested)
+    if not is_free.any():
+        raise NoPlaceError(_no_place(f"new light {light.name!r}"))
+    position = as_position(tested[int(np.argmax(is_free))])
     if light.kind == "point":
         return FreeLight(light.name, Site(position), freedom, places)
     model = None if group.like is None else scene.light(group.like).members[0]
@@ -331,19 +337,6 @@ def _freedom_of_new(
     low, high = space.places.min(axis=0), space.places.max(axis=0)
     freedom = replace(freedom, box=(as_position(low), as_position(high)))
     return freedom, BoxOfPlaces(low, high, space.places)
-
-
-def _first_position(
-    light: NewLight, freedom: Freedom, places: Places, paths: SearchPaths, seed: int
-) -> Position:
-    """Return a free place that a new light may have. Raises NoPlaceError if none is found."""
-    tested = places.random(TESTED, np.random.default_rng(seed))
-    is_free = paths.usable(tested, None if freedom.clear is None else 0.9 * freedom.clear)
-    if light.group.is_kept_out_of_view(is_panel=light.kind == "panel"):
-        is_free &= ~paths.in_view(tested)
-    if not is_free.any():
-        raise NoPlaceError(_no_place(f"new light {light.name!r}"))
-    return as_position(tested[int(np.argmax(is_free))])
 
 
 def _first_direction(model: Emitter | None) -> Position:

@@ -94,7 +94,10 @@ class Rigging:
         lights = []
         for name, table in _table(light, source / "light").items():
             key = source / "light" / name
-            _check_move(table, key)
+            check_keys(table, MOVES, key)
+            if "move" in table:
+                _check_places(table["move"], key / "move")
+            _check_values(table, TURNS, key)
             lights.append((name, dict(table), key))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         named = []
@@ -267,14 +270,6 @@ def _check_values(table: Mapping[str, Any], checks: Mapping[str, Check], where: 
     for key, check in checks.items():
         if key in table and not check.is_valid(table[key]):
             raise _wrong(where / key, table[key], check.expectation)
-
-
-def _check_move(table: Mapping[str, Any], where: SourceKey) -> None:
-    """Raise ConstraintError unless these are valid values of `move`, `aim`, `cone`, `beam`."""
-    check_keys(table, MOVES, where)
-    if "move" in table:
-        _check_places(table["move"], where / "move")
-    _check_values(table, TURNS, where)
 
 
 def _check_on(table: Mapping[str, Any], where: SourceKey) -> None:

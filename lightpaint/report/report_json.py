@@ -59,7 +59,13 @@ def report_numbers(answer: measures.ReportedAnswer, *, missed: Residual | None =
         "command": answer.command,
         "basis": _basis(basis),
         "painting": _painting(target, solution),
-        "view": _view(predicted, transform, residual),
+        "view": {
+            "name": transform.name,
+            "stops": transform.stops,
+            "brighter_than_white": brighter_than_white(predicted.image, transform),
+            "residual_limit": residual.limit,
+            "residual_pixels": 2 * residual.radius + 1,
+        },
         "seen": _appearance(answer.appearance or compare_appearance(solution, predicted)),
         "meant": fit_options(solution),
         "colors": {choice.colors: _choice(choice) for choice in answer.color_choices} or None,
@@ -101,16 +107,6 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
         "importance_mean": float(importance.mean()),
         "importance_max": float(importance.max()),
         "not_finite": target.not_finite,
-    }
-
-
-def _view(predicted: Estimate, transform: ViewTransform, residual: Residual) -> dict[str, Any]:
-    return {
-        "name": transform.name,
-        "stops": transform.stops,
-        "brighter_than_white": brighter_than_white(predicted.image, transform),
-        "residual_limit": residual.limit,
-        "residual_pixels": 2 * residual.radius + 1,
     }
 
 

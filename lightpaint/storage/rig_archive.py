@@ -7,7 +7,7 @@ functions read the same members first, and report what must not be read as a Rig
 import io
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
@@ -167,19 +167,16 @@ def parse_xml(data: bytes, name: str) -> Element:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = _refuse_declaration(name)
+
+    def refuse(*_: object) -> None:
+        raise RigError(f"{name} has a document type declaration: it is not read")
+
+    parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(data, True)
         return builder.close()
     except (expat.ExpatError, ParseError, ValueError, LookupError, AssertionError) as error:
         raise RigError(f"{name} is not XML: {first_line(error)}") from None
-
-
-def _refuse_declaration(name: str) -> Callable[..., None]:
-    def refuse(*_: object) -> None:
-        raise RigError(f"{name} has a document type declaration: it is not read")
-
-    return refuse
 
 
 def as_utf_8(name: str) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, largest
 from lightpaint.colour import BUILT_IN, TransformChoice, ViewTransform, luminance
@@ -152,7 +151,9 @@ def _target_of(
         image, counted, note = _lit(reading, counted)
     else:
         note = _beyond(reading, counted)
-    note = [*note, *_below_zero(image, counted > 0)]
+    if text := painted_target.describe_negative(image, counted > 0):
+        # It may be a colour outside Rec.709, or a mistake.
+        note = [*note, f"{text}: no light makes that, and black comes closest"]
     return painted_target.Target(
         name=reading.path.stem,
         image=image,
@@ -177,12 +178,6 @@ def _target_of(
         ),
         full_size_share=None if importance is None else painted_target.share_of(importance),
     )
-
-
-def _below_zero(image: Floats, counts: npt.NDArray[np.bool_]) -> list[str]:
-    """Return a remark on paint below 0, which may be a colour outside Rec.709 or a mistake."""
-    text = painted_target.describe_negative(image, counts)
-    return [f"{text}: no light makes that, and black comes closest"] if text else []
 
 
 def _open_picture(

@@ -282,7 +282,12 @@ def departure_from_one_stroke(
         for x in (np.flatnonzero(stroke.any(axis=1)), np.flatnonzero(stroke.any(axis=0)))
     )
     inside = stroke[rows, columns]
-    wash = _wash(inside, radius)
+    counts = inside.astype(np.float64)
+    coverage = np.maximum(gaussian_mean(counts, radius), 1e-6)
+
+    def wash(values: Floats) -> Doubles:
+        return np.asarray(gaussian_mean(values * counts, radius) / coverage)
+
     now, asked = (np.maximum(x[:, rows, columns], 0) for x in (look, painted))
     brushes: list[_Brush] = [_Blend(*space, inside, asked, now, dark, wash) for space in SPACES]
     brushes.append(_Gain(inside, asked, now, dark, wash))
@@ -298,17 +303,6 @@ def departure_from_one_stroke(
     result = np.zeros(painted.shape, np.float32)
     result[:, rows, columns] = inside * best
     return result
-
-
-def _wash(inside: Bools, radius: float) -> Wash:
-    """Return a function that averages (…, h, w) over a radius, within a mask alone."""
-    counts = inside.astype(np.float64)
-    coverage = np.maximum(gaussian_mean(counts, radius), 1e-6)
-
-    def washed(values: Floats) -> Doubles:
-        return np.asarray(gaussian_mean(values * counts, radius) / coverage)
-
-    return washed
 
 
 class _Brush:

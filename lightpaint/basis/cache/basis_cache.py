@@ -156,7 +156,9 @@ def keep(basis: Basis) -> bool:
     """
     try:
         path = _path_of(basis)
-        _mark_folder()
+        tag = folder() / TAG
+        if not tag.exists():
+            write_text(tag, TAG_TEXT)
         _write_sums(basis)
         basis_file.write_basis(path, basis)
         for other in _companions_of(path):
@@ -358,13 +360,6 @@ def folder() -> Path:
             "folder that is new or empty, where bases may be kept and deleted"
         )
     return path
-
-
-def _mark_folder() -> None:
-    """Mark the folder as ours, unless it is marked already. Raises OutputError."""
-    tag = folder() / TAG
-    if not tag.exists():
-        write_text(tag, TAG_TEXT)
 
 
 def is_own(path: Path) -> bool:

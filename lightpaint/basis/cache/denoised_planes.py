@@ -138,7 +138,11 @@ class RoughPlanes:
         """Return the plane of light k at unit emission, (h, w, 3) float32; 0 where the scene is
         black.
         """
-        rough = self._share_of_current(k)
+        parts = self.basis.indirect
+        indirect = None if parts is None else parts.planes.plane(k)
+        smoothed, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
+        share = np.divide(smoothed, total, out=np.zeros_like(smoothed), where=total > 0)
+        rough = self.current * resampled(share, self.basis.size)
         if self._small is None:
             return rough
         small = self._small.plane(k)
@@ -150,13 +154,6 @@ class RoughPlanes:
         floor = np.float32(1e-4) * mean_here.mean()
         gain = np.clip((target_mean + floor) / (mean_here + floor), 0, MAX_BLOCK_GAIN)
         return np.asarray(rough * gain, np.float32)
-
-    def _share_of_current(self, k: int) -> Floats:
-        parts = self.basis.indirect
-        indirect = None if parts is None else parts.planes.plane(k)
-        smoothed, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
-        share = np.divide(smoothed, total, out=np.zeros_like(smoothed), where=total > 0)
-        return self.current * resampled(share, self.basis.size)
 
     @cached_property
     def _total(self) -> Floats:

@@ -296,14 +296,10 @@ def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
         paintings=(),
         lighting="",
         combined_looks=(entry.name,),
-        want=_lighting_steps(entry.want),
-    )
-
-
-def _lighting_steps(want: Sequence[str]) -> tuple[str, ...]:
-    """Return the requested steps that apply to a lighting that is combined from others."""
-    return (
-        tuple(step for step in want if step in keys.LIGHTING_STEPS) or checks.GIVEN_LIGHTING_STEPS
+        want=(
+            tuple(step for step in entry.want if step in keys.LIGHTING_STEPS)
+            or checks.GIVEN_LIGHTING_STEPS
+        ),
     )
 
 

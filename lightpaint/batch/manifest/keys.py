@@ -108,14 +108,10 @@ def _shift_light(light: LightSetting, mireds: float) -> LightSetting:
     kelvin = photometry(light.emission, unit=light.unit).kelvin or NEUTRAL
     ends = [
         kelvin_to_rgb(min(max(x, WARMEST), COOLEST))
-        for x in (kelvin, _shift_kelvin(kelvin, mireds))
+        for x in (kelvin, 1e6 / max(1e6 / kelvin + mireds, 1e6 / COOLEST))
     ]
     ratio = np.array(ends[1]) / np.maximum(ends[0], 1e-6)
     return with_emission(light, np.array(light.emission) * ratio, keeps_luminance=True)
-
-
-def _shift_kelvin(kelvin: float, mireds: float) -> float:
-    return 1e6 / max(1e6 / kelvin + mireds, 1e6 / COOLEST)
 
 
 def with_emission(

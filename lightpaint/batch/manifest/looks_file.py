@@ -172,15 +172,7 @@ def _merge(defaults: Table, table: Table) -> Table:
         if key == "constraints" and key in values:
             value = [values[key], value]
         values[key] = value
-    _drop_unused(values, look)
-    still_unclear = {
-        key for key in unclear_keys if key not in look or key in (*MERGED_TABLES, "constraints")
-    }
-    return Table(table.label, {**values, **_as_list(values)}, table.unclear_keys | still_unclear)
-
-
-def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
-    """Drop default steps, tables and shares that a look of this kind cannot use."""
+    # Default steps, tables and shares that a look of this kind cannot use are dropped.
     if "want" in values and "want" not in look and {"lighting", "lightings"} & set(look):
         values["want"] = [step for step in values["want"] if step in LIGHTING_STEPS] or list(
             LIGHTING_STEPS[:1]
@@ -190,6 +182,10 @@ def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
     for step in ("render", "export"):
         if step not in look and step not in values.get("want", ()):
             values.pop(step, None)
+    still_unclear = {
+        key for key in unclear_keys if key not in look or key in (*MERGED_TABLES, "constraints")
+    }
+    return Table(table.label, {**values, **_as_list(values)}, table.unclear_keys | still_unclear)
 
 
 def _as_list(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -226,21 +222,16 @@ def write_starter_manifest(
             Hint("force", True),
         )
     base = path.parent
-    text = STARTER.format(name=path.name, source=_source_defaults(scene, base))
-    write_text(
-        path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
-    )
-
-
-def _source_defaults(source: str, base: Path) -> str:
-    """Return the defaults of looks of a scene, a basis or light groups."""
-    if Path(source).suffix.lower() != ".xml" and is_light_groups(Path(source)):
+    if Path(scene).suffix.lower() != ".xml" and is_light_groups(Path(scene)):
         key, defaults = "light_groups", BASIS_DEFAULTS
-    elif is_basis_file(Path(source)):
+    elif is_basis_file(Path(scene)):
         key, defaults = "basis", BASIS_DEFAULTS
     else:
         key, defaults = "scene", SCENE_DEFAULTS
-    return f"{key} = {_quoted(source, base)}\n{defaults}"
+    text = STARTER.format(name=path.name, source=f"{key} = {_quoted(scene, base)}\n{defaults}")
+    write_text(
+        path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
+    )
 
 
 def _quoted(file: str, base: Path) -> str:

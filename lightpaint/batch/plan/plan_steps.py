@@ -293,10 +293,6 @@ def look_seconds(look: PlannedLook, plan: Plan) -> float:
         spent_s += REPORT_S * pixels * ("report" in steps)
         spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in steps)
     if any(step.task.kind == "render" and not step.is_done for step in look.steps):
-        spent_s += SAMPLE_S * _final_samples(look, costs)
+        spp = look.entry.final.spp
+        spent_s += SAMPLE_S * sum(cost.size[0] * cost.size[1] * (spp or cost.spp) for cost in costs)
     return spent_s
-
-
-def _final_samples(look: PlannedLook, costs: Iterable[Cost]) -> int:
-    spp = look.entry.final.spp
-    return sum(cost.size[0] * cost.size[1] * (spp or cost.spp) for cost in costs)

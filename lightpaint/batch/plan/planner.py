@@ -285,7 +285,14 @@ class _Planner:
         scene = scenes[0] if scenes else None
         basis = None if entry.basis is None else entry.basis.content
         groups = basis if isinstance(basis, LightGroups) else None
-        source_files = _files_of_lighting_look(entry, groups)
+        files = entry.scenes[0].read_files if entry.scenes else ()
+        if groups is not None:
+            files += tuple(groups.files)
+        elif entry.basis is not None:
+            files += (Path(entry.basis.path),)
+        if entry.settings.planes is not None:
+            files += (Path(entry.settings.planes),)
+        source_files = (*files, Path(entry.lighting)) if entry.lighting else files
         if entry.lighting:
             _check_given_lighting(entry, scene, basis)
         if scene is not None:
@@ -411,18 +418,6 @@ def _chooses_mixes(constraints: Constraints) -> bool:
     keys = {key for _, table, _ in constraints.lights for key in table}
     has_colors = bool(constraints.ties) or not keys.isdisjoint(("rf", "color", "kelvin"))
     return has_colors or constraints.prefer_emitters is not None
-
-
-def _files_of_lighting_look(entry: LookEntry, groups: LightGroups | None) -> tuple[Path, ...]:
-    """Return the files that a look with a given or combined lighting reads."""
-    files = entry.scenes[0].read_files if entry.scenes else ()
-    if groups is not None:
-        files += tuple(groups.files)
-    elif entry.basis is not None:
-        files += (Path(entry.basis.path),)
-    if entry.settings.planes is not None:
-        files += (Path(entry.settings.planes),)
-    return (*files, Path(entry.lighting)) if entry.lighting else files
 
 
 def _check_given_lighting(

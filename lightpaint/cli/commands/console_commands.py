@@ -343,7 +343,14 @@ class ConsoleMonitor:
         now_s = time.monotonic()
         if not at_once and now_s < self._printed_s + LINE_S:
             return
-        texts = self._source_texts()
+        sources = self._receiver.sources
+        texts = {
+            f"universe {universe}": f"from {sources[universe].name!r}, priority "
+            f"{sources[universe].priority}"
+            if universe in sources
+            else "no source any more; its levels stay"
+            for universe in sorted(self._receiver.levels)
+        }
         texts |= self._channel_texts() if self._rig is None else self._light_texts()
         for subject, text in texts.items():
             if self._printed.get(subject) != text:
@@ -363,16 +370,6 @@ class ConsoleMonitor:
         }
         document = {"protocol": self._receiver.protocol.scheme, "universes": universes}
         return document if self._rig is None else {**document, "lights": self._drives()}
-
-    def _source_texts(self) -> dict[str, str]:
-        sources = self._receiver.sources
-        return {
-            f"universe {universe}": f"from {sources[universe].name!r}, priority "
-            f"{sources[universe].priority}"
-            if universe in sources
-            else "no source any more; its levels stay"
-            for universe in sorted(self._receiver.levels)
-        }
 
     def _channel_texts(self) -> dict[str, str]:
         """Return the channels of each universe that are not at 0."""

@@ -418,7 +418,10 @@ def relight(
     answers = [read_lighting(path) for path in lightings]
     names = [a.target or path.stem for a, path in zip(answers, lightings, strict=True)]
     folders = folders_of(output, names)
-    scene_on_film = _loaded(scene)
+    scene_on_film = scene.content
+    note_scene(scene_on_film)
+    if note := use_variant().note:
+        terminal.say(note)
     results = [
         pipeline.relit_folder(scene_on_film, path, folder, force=settings.force)
         for path, folder in zip(lightings, folders, strict=True)
@@ -499,12 +502,3 @@ def _replaced_files(output: Path) -> list[Path]:
         return [output, output.with_suffix(".png")]
     finish(output)
     return files_in_the_way(output)
-
-
-def _loaded(scene: pipeline.SceneFile) -> Scene:
-    """Return the scene, without remarks on single lights."""
-    scene_on_film = scene.content
-    note_scene(scene_on_film)
-    if note := use_variant().note:
-        terminal.say(note)
-    return scene_on_film

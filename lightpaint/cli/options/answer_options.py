@@ -149,7 +149,7 @@ def add_batch(parser: argparse.ArgumentParser) -> None:
     """Add all options of the command."""
     _add_looks(parser)
     _add_failures(parser)
-    _add_workers(parser)
+    add_fields(parser, RunOptions, "workers", "cluster", "shared_fs", "task_limit_s")
     add_fields(parser, RunOptions, "shares_folder")
     parser.add_argument(
         "--export",
@@ -209,11 +209,6 @@ def _add_failures(parser: argparse.ArgumentParser) -> None:
     )
     add_fields(group, RunOptions, "keep_going")
     add_fields(parser, RunOptions, "retry")
-
-
-def _add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add options for workers: local processes, or a cluster."""
-    add_fields(parser, RunOptions, "workers", "cluster", "shared_fs", "task_limit_s")
 
 
 #: Adds an option which may be repeated: its flag, metavar, type and help.

@@ -4,7 +4,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lightpaint.cli.options import job_options, source_options
 from lightpaint.cli.options.argument_order import options_but
@@ -14,9 +14,6 @@ from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
 from lightpaint.lighting import read_constraints
 from lightpaint.pipeline import GroupsFile, SceneFile, Settings
-
-if TYPE_CHECKING:
-    from lightpaint.batch import RunOptions
 
 
 def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
@@ -196,21 +193,6 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
 
 def _batch_arguments(options: Namespace) -> dict[str, Any]:
     """Return the arguments of `batch`."""
-    return {
-        "paths": options.paths,
-        "output": Path(options.output) if options.output else None,
-        "is_first": options.init,
-        "is_dry": options.dry_run,
-        "name_patterns": options.only,
-        "form": options.export,
-        "run_options": _run_options(options),
-        "force": options.force,
-        "log": Path(options.log) if options.log else None,
-    }
-
-
-def _run_options(options: Namespace) -> "RunOptions":
-    """Return the options of a run. Raises BatchError if they exclude each other."""
     from lightpaint.batch import RunOptions
 
     if options.cluster is None and options.shared_fs:
@@ -219,7 +201,17 @@ def _run_options(options: Namespace) -> "RunOptions":
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
         )
-    return RunOptions(**{x.name: getattr(options, x.name) for x in fields(RunOptions)})
+    return {
+        "paths": options.paths,
+        "output": Path(options.output) if options.output else None,
+        "is_first": options.init,
+        "is_dry": options.dry_run,
+        "name_patterns": options.only,
+        "form": options.export,
+        "run_options": RunOptions(**{x.name: getattr(options, x.name) for x in fields(RunOptions)}),
+        "force": options.force,
+        "log": Path(options.log) if options.log else None,
+    }
 
 
 def _paint_arguments(

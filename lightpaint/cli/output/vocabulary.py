@@ -80,7 +80,10 @@ def _spell(datum: Datum) -> str | None:
     if isinstance(datum, SourceKey) and datum.source == BY_OPTION:
         return _option_of_key(datum) or datum.path
     if isinstance(datum, Lead) and datum.key.source == BY_OPTION:
-        return _lead(datum.key)
+        option = _option_of_key(datum.key)
+        if option is None:
+            return "" if datum.key.keys[0] == "light" else f"{datum.key.path}: "
+        return f"{option.removesuffix(' on').removesuffix(':')}: "
     return None
 
 
@@ -107,14 +110,6 @@ def _option_of_key(key: SourceKey) -> str | None:
         case ("new", *setting) if len(setting) < 2:
             return " ".join(("--add:", *map(str, setting)))
     return None
-
-
-def _lead(key: SourceKey) -> str:
-    """Return how an error of a key begins; "" if the error names the light by itself."""
-    option = _option_of_key(key)
-    if option is None:
-        return "" if key.keys[0] == "light" else f"{key.path}: "
-    return f"{option.removesuffix(' on').removesuffix(':')}: "
 
 
 def from_any_folder(words: Sequence[str] | str) -> str:

@@ -84,7 +84,13 @@ class _GeometryWalk:
             if target in self.references:
                 raise RigError(f"{self.name}: its geometry {target!r} refers to itself")
             referred = self.by_name[target]
-            offsets, overwrite = _breaks_of(element, parent)
+            offsets, overwrite = dict(parent.offsets), parent.overwrite
+            for entry in element.findall("Break"):
+                number = int(entry.get("DMXBreak", "1"))
+                universe, _, address = entry.get("DMXOffset", "1").rpartition(".")
+                added = int(address) - 1 + 512 * (int(universe or 1) - 1)
+                offsets[number] = parent.offsets.get(number, 0) + added
+                overwrite = number, offsets[number]
             self.references.append(target)
         beam, given = _beam_of(referred)
         source = referred.get("Name", "")
@@ -99,17 +105,6 @@ class _GeometryWalk:
                 yield from self.visit(child, here, inner)
         if referred is not element:
             self.references.pop()
-
-
-def _breaks_of(element: Element, parent: Placed) -> tuple[dict[int, int], tuple[int, int]]:
-    offsets, overwrite = dict(parent.offsets), parent.overwrite
-    for entry in element.findall("Break"):
-        number = int(entry.get("DMXBreak", "1"))
-        universe, _, address = entry.get("DMXOffset", "1").rpartition(".")
-        added = int(address) - 1 + 512 * (int(universe or 1) - 1)
-        offsets[number] = parent.offsets.get(number, 0) + added
-        overwrite = number, offsets[number]
-    return offsets, overwrite
 
 
 def _beam_of(element: Element) -> tuple[Any, frozenset[str]]:

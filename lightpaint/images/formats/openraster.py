@@ -211,7 +211,9 @@ def write_openraster(
                 archive.write(picture, source)
             write_png_16(picture, merged, texts=texts)
             archive.write(picture, MERGED_PICTURE)
-            archive.writestr(THUMBNAIL, _thumbnail(merged))
+            small = Image.fromarray(to_8_bit(merged))
+            small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+            archive.writestr(THUMBNAIL, png_bytes(np.asarray(small)))
             text = ElementTree.tostring(image, encoding="utf-8", xml_declaration=True)
             archive.writestr(STACK, text, zipfile.ZIP_DEFLATED)
 
@@ -229,7 +231,12 @@ def opened_openraster(
     with ExitStack() as open_things:
         with naming_damage():
             archive = open_things.enter_context(zipfile.ZipFile(path))
-            image = _parsed_stack(archive)
+            if _member(archive, STACK).file_size > MAX_STACK:
+                raise ImageError("declares a list of layers that is too long")
+            text = archive.read(STACK)
+            if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
+                raise ImageError("has a list of layers with declarations of its own: save it again")
+            image = ElementTree.fromstring(text)
             size = int(image.attrib["h"]), int(image.attrib["w"])
             _check_size(*size)
             root = image.find("stack")
@@ -238,15 +245,6 @@ def opened_openraster(
             _check_layers(root, archive)
         folder = open_things.enter_context(tempfile.TemporaryDirectory())
         yield size, _read_items(root, archive, Path(folder) / "layer.png")
-
-
-def _parsed_stack(archive: zipfile.ZipFile) -> ElementTree.Element:
-    if _member(archive, STACK).file_size > MAX_STACK:
-        raise ImageError("declares a list of layers that is too long")
-    text = archive.read(STACK)
-    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise ImageError("has a list of layers with declarations of its own: save it again")
-    return ElementTree.fromstring(text)
 
 
 def _check_layers(root: ElementTree.Element, archive: zipfile.ZipFile) -> None:
@@ -386,9 +384,3 @@ def _eye(item: RasterLayer | RasterGroup) -> str:
 def _xml_text(name: str) -> str:
     """Return a name without characters that XML cannot hold."""
     return "".join(c if c >= " " and not 0xFFFE <= ord(c) <= 0xFFFF else " " for c in name)
-
-
-def _thumbnail(merged: Floats) -> bytes:
-    small = Image.fromarray(to_8_bit(merged))
-    small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
-    return png_bytes(np.asarray(small))

@@ -13,7 +13,6 @@ from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
 from weakref import WeakValueDictionary
 
@@ -72,20 +71,6 @@ Assignable = TypeVar("Assignable")
 
 #: Maximum number of rounds in which callbacks react to values set by callbacks.
 MAX_CALLBACK_ROUNDS = 20
-
-
-def _claim_file(path: Path, painter: "Painter") -> None:
-    """Register `painter` for the session at `path`, and close the painter that had it before."""
-    if (earlier := _PAINTERS_BY_FILE.get(path.resolve())) is not None:
-        earlier.close()  # the user has run its cell again
-    _PAINTERS_BY_FILE[path.resolve()] = painter
-
-
-def _store_path(store: Any) -> Path | None:
-    """Return the path of the session file, if one is given. Raises PaintError for anything else."""
-    if not isinstance(store, str | Path | None):
-        raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
-    return None if store is None else Path(store)
 
 
 def _open_store(path: Path | None, identity: Identity) -> Store:
@@ -148,14 +133,10 @@ class Callback:
             self.handler(change)
         except Exception as error:
             # The traceback begins at the callback's own line.
-            traceback.print_exception(error.with_traceback(_from_caller(error)))
+            frames = error.__traceback__
+            traceback.print_exception(error.with_traceback(frames and (frames.tb_next or frames)))
             text = f"{type(error).__name__}: {first_line(error)}"
             self.warn(f"a callback of painter.{change['name']} failed: {text}")
-
-
-def _from_caller(error: Exception) -> TracebackType | None:
-    frames = error.__traceback__
-    return frames and (frames.tb_next or frames)
 
 
 class SessionTraits:
@@ -258,21 +239,17 @@ class SessionTraits:
         for _ in range(MAX_CALLBACK_ROUNDS):
             values, self._pending = self._pending, []
             for name, value in values:
-                self._apply_late(name, value)
+                try:
+                    self._apply(LOADERS[name](self._studio.session, value))
+                except Exception as error:  # the cell that set it has ended
+                    traceback.print_exc()
+                    self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
         if self._pending:
             self._pending = []
             self._warn(
                 "callbacks of the painter set something again each time that they are called: the "
                 "last values were not set"
             )
-
-    def _apply_late(self, name: str, value: Any) -> None:
-        """Apply a value that was set earlier; show an error, since its cell has ended."""
-        try:
-            self._apply(LOADERS[name](self._studio.session, value))
-        except Exception as error:
-            traceback.print_exc()
-            self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -361,9 +338,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         )
         if target is not None:
             widget_arguments.check_target_sizes(target, subjects)
-        path = _store_path(store)
+        if not isinstance(store, str | Path | None):
+            raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
+        path = None if store is None else Path(store)
         if path is not None:
-            _claim_file(path, self)
+            if (earlier := _PAINTERS_BY_FILE.get(path.resolve())) is not None:
+                earlier.close()  # the user has run its cell again
+            _PAINTERS_BY_FILE[path.resolve()] = self
         self._studio = Studio(subjects, partial(_open_store, path))
         self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
         self._session_traits = SessionTraits(
@@ -532,19 +513,16 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         def act() -> None:
             with self._lock:
-                self._forward(message)
+                self._views.send(message)
+                is_exact = isinstance(message, AnswerUpdate) and message.exact
+                if is_exact or isinstance(message, SessionState):
+                    self._session_traits.update()
+                    self._output.follow()
 
         if not self._ready.is_set() and isinstance(message, SessionState | Notice):
             self._failed = message.text if isinstance(message, Notice) else ""
             self._ready.set()
         self._kernel.call(act)
-
-    def _forward(self, message: Message) -> None:
-        self._views.send(message)
-        is_exact = isinstance(message, AnswerUpdate) and message.exact
-        if is_exact or isinstance(message, SessionState):
-            self._session_traits.update()
-            self._output.follow()
 
 
 #: Arguments of a painter other than settings.

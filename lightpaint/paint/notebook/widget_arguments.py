@@ -270,7 +270,13 @@ def widget_subjects(
 
     Raises LightpaintError if one cannot be painted.
     """
-    _check_types(constraints=constraints, transform=transform)
+    if not isinstance(constraints, Constraints | None):
+        kind = type(constraints).__name__
+        raise PaintError(f"the constraints are a {kind}: give lp.Constraints.of(...)")
+    if not isinstance(transform, ViewTransform | TransformChoice | None):
+        raise PaintError(
+            f"transform is {transform!r}: expected a ViewTransform, like lp.ViewTransform('agx')"
+        )
     for name, value_of, example in (
         ("layers", layers, "file, like 'layers.ora'"),
         ("folder", folder, "folder"),
@@ -291,16 +297,6 @@ def widget_subjects(
     for subject in subjects:
         subject.check_files()
     return subjects
-
-
-def _check_types(*, constraints: Any, transform: Any) -> None:
-    if not isinstance(constraints, Constraints | None):
-        kind = type(constraints).__name__
-        raise PaintError(f"the constraints are a {kind}: give lp.Constraints.of(...)")
-    if not isinstance(transform, ViewTransform | TransformChoice | None):
-        raise PaintError(
-            f"transform is {transform!r}: expected a ViewTransform, like lp.ViewTransform('agx')"
-        )
 
 
 def _loaded(value: Any) -> Basis | Scene | LightGroups:

@@ -91,12 +91,9 @@ class LightMover:
 
     def _open_rig(self) -> None:
         self.rig.open(self._access.session.bases)
-        self._publish_rig()
-        self.rig.trace_paths()
-
-    def _publish_rig(self) -> None:
         for message in self.rig_messages():
             self._publisher.publish(message)
+        self.rig.trace_paths()
 
     def rig_messages(self) -> list[protocol.Message]:
         """Return the places of lights, if pages have requested them."""

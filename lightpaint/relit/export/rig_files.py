@@ -220,7 +220,13 @@ def cue_list_csv(rig: dmx.ConsoleRig, cues: Sequence[Cue]) -> str:
             aimed, _ = dmx.aimed_rig(aimed, cue.directions)
         levels = dmx.encode_levels(aimed, cue.drives)
         for fixture in aimed.fixtures:
-            names = _channel_names(fixture)
+            counts = Counter(channel.attribute for channel in fixture.channels)
+            names = {
+                channel: channel.attribute
+                if counts[channel.attribute] == 1
+                else f"{channel.geometry}.{channel.attribute}"
+                for channel in fixture.channels
+            }
             for channel in _set_channels(fixture):
                 level = channel_level(fixture, channel, levels)
                 value = round(level / channel.highest * FULL_LEVEL)
@@ -236,16 +242,6 @@ def _set_channels(fixture: dmx.RigFixture) -> list[dmx.DmxChannel]:
     if fixture.is_aimed:
         used |= {axis.channel for head in fixture.heads for axis in head.axes}
     return [fixture.channels[k] for k in sorted(used)]
-
-
-def _channel_names(fixture: dmx.RigFixture) -> dict[dmx.DmxChannel, str]:
-    counts = Counter(channel.attribute for channel in fixture.channels)
-    return {
-        channel: channel.attribute
-        if counts[channel.attribute] == 1
-        else f"{channel.geometry}.{channel.attribute}"
-        for channel in fixture.channels
-    }
 
 
 @dataclass(frozen=True)

@@ -59,10 +59,15 @@ def constraints_section(
     if free is None:
         return Markup("")
     without, with_constraints = relative_residual(free), relative_residual(solution)
+    used_count, missed_with = _used_count(solution), dict(solution.certificate.curve)
     pictures = [
         (free.weights, "Without constraints", f"{spoken_percent(without)} missed."),
         (solution.weights, "With the constraints", f"{spoken_percent(with_constraints)} missed."),
-        *_neighbours(solution),
+        *[
+            (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
+            for count, weights in solution.tried
+            if count in missed_with and 0 < abs(count - used_count) <= NEIGHBOURS
+        ],
     ]
     curve, shown_rows = _curve(solution, free)
     return html(
@@ -95,16 +100,6 @@ def _curve(
         *((_lights(count), missed) for count, missed in curve if (count, missed) not in points),
     ]
     return [{"label": label, "missed": missed} for label, missed in entries], len(points) + 1
-
-
-def _neighbours(solution: lighting.Solution) -> list[tuple[Doubles, str, str]]:
-    """Return, with `sparse`, pictures with fewer and with more lights, as `_figures` takes them."""
-    used_count, missed_with = _used_count(solution), dict(solution.certificate.curve)
-    return [
-        (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
-        for count, weights in solution.tried
-        if count in missed_with and 0 < abs(count - used_count) <= NEIGHBOURS
-    ]
 
 
 def _figures(

@@ -36,7 +36,11 @@ def prepare_llvm() -> Llvm | None:
     """Find a usable LLVM and make Dr.Jit use it. Returns None if there is none."""
     usable = next((c for c in llvm_candidates() if c.version is not None), None)
     if usable is not None and "drjit" not in sys.modules:
-        _preload_cpp_runtime(usable.path)
+        # The package's own link to its runtime appears only when Python starts for the second time.
+        # RTLD_LOCAL, because a global runtime would take over Mitsuba's exceptions, and each would
+        # crash the process.
+        for path in _cpp_runtime(usable.path):
+            ctypes.CDLL(str(path), ctypes.RTLD_LOCAL)
         os.environ["DRJIT_LIBLLVM_PATH"] = str(usable.path)
     return usable
 
@@ -134,11 +138,3 @@ def _cpp_runtime(llvm: Path) -> list[Path]:
     folders = [llvm.parent, *sorted(llvm.parent.glob("*-linux-gnu"))]
     libraries = [folder / name for name in names for folder in folders if (folder / name).exists()]
     return libraries if len(libraries) >= len(names) - 1 else []
-
-
-def _preload_cpp_runtime(llvm: Path) -> None:
-    # The package's own link to its runtime appears only when Python starts for the second time.
-    # RTLD_LOCAL, because a global runtime would take over Mitsuba's exceptions, and each of them
-    # would crash the process.
-    for path in _cpp_runtime(llvm):
-        ctypes.CDLL(str(path), ctypes.RTLD_LOCAL)
