@@ -48,7 +48,12 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.painting_noise import CORRELATION, PaintingNoise
 from lightpaint.lighting.analysis.noise.residuals import steadier_light
-from lightpaint.lighting.analysis.noise.weight_directions import NORMAL, WeightResponse, solve_for
+from lightpaint.lighting.analysis.noise.weight_directions import (
+    NORMAL,
+    WeightResponse,
+    WeightSpread,
+    solve_for,
+)
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -377,25 +382,15 @@ def error_bars(
     (spread, by_painting), (of_interval, wide_by_painting) = spreads[0], spreads[-1]
     if painted is not None:
         wide_by_painting = wide_by_painting * t_ratios(painted[1])
-    moved = np.zeros_like(weights)
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
         unsteady = solve_for(solution, bent) - weights - bias
-    matrices = solution.equations.M
-    channels = with_progress(list(matrices), "channels")
-    own_inverse = np.array([np.diag(pseudo_inverse(x)) for x in channels])
-    doubts = noise_doubts(solution, noise.power, own_inverse)
-    if doubts.any():
-        weak = weakest_matrix(matrices, own_inverse, noise, doubts, unbiased.M)
-        # A step from a render of the mix depends on M alone.
-        is_refined = problem.refinement is not None
-        weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
-        far = solve_for(solution, weak_equations)
-        response = WeightResponse(solution, weak_equations, weak_equations, far)
-        weak_spread = response.spread(covariance)
-        spread, of_interval = (x.mixed_with(weak_spread, doubts) for x in (spread, of_interval))
-        moved = far - center
+    doubts, weak = _where_lights_are_noise(solution, noise, step, unbiased)
+    moved = np.zeros_like(weights)
+    if weak is not None:
+        spread, of_interval = (x.mixed_with(weak[0], doubts) for x in (spread, of_interval))
+        moved = weak[1] - center
     by_poses, reading = _scatter_by_poses(solution, level_errors), ReadingNoise.of(solution)
     sides, wide = [], []
     beyond = reading.below, reading.above
@@ -420,6 +415,28 @@ def error_bars(
         & _is_wide(weights, interval),
         problem.filter_share > 0,
     )
+
+
+def _where_lights_are_noise(
+    solution: Solution, noise: Noise, step: "_GradientStep", unbiased: NormalEquations
+) -> tuple[Doubles, tuple[WeightSpread, Doubles] | None]:
+    """Return how likely the power of each light is noise, (n, 3), from 0 to 1; and the spread of
+    the weights, and these, (n, 3), where such lights have as little power as they may; None if no
+    light's is. unbiased: the equations without noise.
+    """
+    matrices = solution.equations.M
+    channels = with_progress(list(matrices), "channels")
+    own_inverse = np.array([np.diag(pseudo_inverse(x)) for x in channels])
+    doubts = noise_doubts(solution, noise.power, own_inverse)
+    if not doubts.any():
+        return doubts, None
+    weak = weakest_matrix(matrices, own_inverse, noise, doubts, unbiased.M)
+    # A step from a render of the mix depends on M alone.
+    is_refined = solution.problem.refinement is not None
+    equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
+    far = solve_for(solution, equations)
+    response = WeightResponse(solution, equations, equations, far)
+    return doubts, (response.spread(noise.full_covariance), far)
 
 
 def _painting_covariance(solution: Solution) -> tuple[Doubles, Doubles] | None:
