@@ -13,6 +13,7 @@ from lightpaint.cli.options.option_groups import add_fields
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.vocabulary import OPTIONS, RECORDS, SPELLINGS
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.relit.formats import FORMS
 from lightpaint.validation import FieldOption, Option, number, options_of, whole
 
 #: Fields that no option of their own sets, and why.
@@ -116,3 +117,12 @@ def test_what_the_field_refuses_is_an_error_of_the_option(words: str, message: s
     with pytest.raises(argparse.ArgumentError) as refusal:
         parsed(*words.split())
     assert str(refusal.value).startswith(message)
+
+
+def test_export_names_all_formats_that_there_are() -> None:
+    # Help loads no format: their libraries take a second.
+    [export] = (command for command in commands() if command.prog.endswith(" export"))
+    [to] = (x for x in export._actions if "--to" in x.option_strings)
+    names = str(to.metavar).split(",")
+    assert {*names} == {*FORMS, "cues"}
+    assert all(f"{name}:" in str(to.help) or f"{name}," in str(to.help) for name in names)
