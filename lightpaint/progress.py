@@ -208,6 +208,9 @@ class _Stage:
         self._begin_s, self._announcement = time.monotonic(), Announcement(label, advice)
         #: Held by the loop that is reported.
         self.turn = Lock()
+        #: That loop: its pace, the steps that are done, all steps, and their unit.
+        self.loop: tuple[Pace, int, int, str] | None = None
+        self._shown: tuple[Pace, int, int, str] | None = None
 
     def announce(self, expected_s: float, advice: Sentence) -> None:
         """Say how long the stage takes, if that is long; once."""
@@ -220,6 +223,7 @@ class _Stage:
         spent_s = time.monotonic() - self._begin_s
         if spent_s < QUIET_S:
             return
+        self._shown = pace, done, total, unit
         with self.voice:
             remark = self._announcement.remark(spent_s, pace.left_s(done, total), done / total)
             if remark is not None:
@@ -229,6 +233,16 @@ class _Stage:
                 self.listen(self.label, done, total, unit)
             finally:
                 _PACE.reset(token)
+
+    def repeat(self) -> None:
+        """Report where the loop stands, unless that is known: a step takes long. A stage that has
+        shown no loop has one step.
+        """
+        loop = self.loop
+        if loop is None and self._shown is None:
+            loop = Pace(), 0, 1, "steps"
+        if loop not in (None, self._shown):
+            self.report(*loop)
 
 
 _PACE: ContextVar[Pace | None] = ContextVar("pace", default=None)
@@ -278,6 +292,12 @@ def announce(expected_s: float, advice: Sentence = NO_ADVICE) -> None:
         current.announce(expected_s, advice)
 
 
+def still_working() -> None:
+    """Show the present stage, if it lasts a second, while a call goes on that counts no steps."""
+    if (current := _STAGE.get()) is not None:
+        current.repeat()
+
+
 @contextmanager
 def counting(total: int, unit: str | None) -> Iterator[Callable[[], None]]:
     """Yield a function to call, from any thread, after each of the `total` steps of a loop.
@@ -289,16 +309,19 @@ def counting(total: int, unit: str | None) -> Iterator[Callable[[], None]]:
         yield lambda: None
         return
     pace, done, counter = Pace(), 0, Lock()
+    current.loop = (pace, 0, total, unit) if total else None
 
     def advance() -> None:
         nonlocal done
         with counter:
             done += 1
+            current.loop = pace, done, total, unit
         current.report(pace, done, total, unit)
 
     try:
         yield advance
     finally:
+        current.loop = None
         current.turn.release()
 
 

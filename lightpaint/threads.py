@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
-from lightpaint.progress import cancellable, cancellation_check, counting
+from lightpaint.progress import cancellable, cancellation_check, counting, still_working
 
 #: Seconds between two checks whether work was cancelled while a call runs apart.
 CHECK_S = 0.1
@@ -140,8 +140,8 @@ def parallel_map(
 def run_apart(work: Callable[..., Result], *arguments: Any) -> Result:
     """Return `work(*arguments)`, a call of seconds that nothing can interrupt, as of LAPACK.
 
-    It runs in a thread of its own. If the calling thread is interrupted, or its work cancelled, the
-    call is left to itself, and its result is dropped.
+    It runs in a thread of its own, and the stage that it belongs to is shown. If the calling thread
+    is interrupted, or its work cancelled, the call is left to itself, and its result is dropped.
     """
     check, outcome = cancellation_check(), Future[Result]()
 
@@ -154,6 +154,7 @@ def run_apart(work: Callable[..., Result], *arguments: Any) -> Result:
     Thread(target=copy_context().run, args=(run,), name="lightpaint-apart", daemon=True).start()
     while not wait([outcome], CHECK_S).done:
         check()
+        still_working()
     return outcome.result()
 
 

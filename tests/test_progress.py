@@ -24,6 +24,7 @@ from lightpaint.progress import (
 )
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.threads import (
+    CHECK_S,
     end_background_work,
     parallel_map,
     run_apart,
@@ -292,3 +293,23 @@ def test_a_stage_that_knows_its_time_says_so_before_its_first_step(clock: Simple
         for _ in with_progress(range(100)):
             clock.now_s += 6
     assert reports.remarks == ["analysis takes 10 min or more (error_bars=False skips it)"]
+
+
+def test_a_stage_is_shown_while_a_call_counts_no_steps(reports: Reports):
+    """As LAPACK, for which a step takes long: once for each step, and no other time."""
+
+    def wait_apart() -> None:
+        run_apart(time.sleep, 4 * CHECK_S)
+
+    with stage("comparison", reports):
+        wait_apart()
+        wait_apart()
+    assert reports.counts == [("comparison", 0, 1, "steps")]
+    reports.counts.clear()
+    with stage("similar lights", reports):
+        for _ in with_progress(range(2), "channels"):
+            wait_apart()
+        wait_apart()  # no step goes back
+    channels = [("similar lights", k, 2, "channels") for k in range(3)]
+    assert reports.counts == channels
+    run_apart(time.sleep, 2 * CHECK_S)  # outside a stage nobody listens

@@ -33,7 +33,7 @@ from lightpaint.lighting.linear_problem import reduce_lights, whites_for
 from lightpaint.lighting.problem import ViewsReading, around_of
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
-from lightpaint.progress import stage
+from lightpaint.progress import stage, with_progress
 
 #: Two images are alike if their normalised inner product is above 1 − ALIKE, and several are
 #: ambiguous if a mix of them cancels to less than that share.
@@ -148,7 +148,7 @@ def _cancelling_mixes(
 ) -> list[tuple[int, ...]]:
     """Return the mixes of the lights `heads` that cancel in some channel, each once."""
     mixes: dict[tuple[int, ...], None] = {}
-    for c in range(len(cosines)):
+    for c in with_progress(range(len(cosines)), "channels"):
         lit_heads = np.array([head for head in heads if lit[c, head]], dtype=int)
         matrix = cosines[c][np.ix_(lit_heads, lit_heads)]
         if _is_above(matrix, alike):

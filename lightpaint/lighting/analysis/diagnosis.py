@@ -30,6 +30,7 @@ from lightpaint.lighting.analysis.noise.weight_directions import all_columns
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve_again
+from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
@@ -287,9 +288,10 @@ def unbounded_weights(solution: Solution) -> Doubles:
         return np.asarray(weights - step.reshape(3, -1).T)
     closest = weights.copy()
     is_movable = equations.reached & ~solution.basis.is_fixed[:, None]
-    for c, M in enumerate(equations.M):
+    for c in with_progress(range(3), "channels"):
         moved = np.flatnonzero(is_movable[:, c])
-        closest[moved, c] -= pseudo_inverse(M[np.ix_(moved, moved)]) @ gradient[moved, c]
+        M = equations.M[c][np.ix_(moved, moved)]
+        closest[moved, c] -= pseudo_inverse(M) @ gradient[moved, c]
     return closest
 
 
