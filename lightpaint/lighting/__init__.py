@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
     from lightpaint.lighting.analysis.noise.noise_of_sums import covariance_of_sums
-    from lightpaint.lighting.analysis.noise.painting_filter import answer_without_filter
+    from lightpaint.lighting.analysis.noise.rendered_painting import answer_to_render
     from lightpaint.lighting.analysis.noise.sample_demand import (
         pixel_variances, sample_demand, top_up_counts,
     )

@@ -22,7 +22,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, can_be_multiplied, channel_responses
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.held_answer import hold_to_current
-from lightpaint.lighting.analysis.noise.painting_filter import answer_without_filter
+from lightpaint.lighting.analysis.noise.rendered_painting import answer_to_render
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
@@ -99,8 +99,8 @@ def solve(
 def default_answer(
     problem: Problem, finish: Callable[[Solution], Solution] = lambda x: x
 ) -> Solution:
-    """Solve a problem, take the filter out of a painting that is a render, and hold the answer to
-    the current lights where changes bring nothing.
+    """Solve a problem, read a painting that is a render as one, and hold the answer to the current
+    lights where changes bring nothing.
 
     finish: what is done to each answer once it is solved, as the correction of its noise.
     """
@@ -108,7 +108,7 @@ def default_answer(
     def finish_multiplied(solution: Solution) -> Solution:
         return answer_as_multiplied(finish(solution), finish)
 
-    solution = answer_without_filter(finish_multiplied(solution_of(problem)), finish)
+    solution = answer_to_render(finish_multiplied(solution_of(problem)), finish)
     return hold_to_current(solution, finish_multiplied)
 
 

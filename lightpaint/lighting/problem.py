@@ -133,7 +133,9 @@ class Problem(linear_problem.LinearProblem):
         holding: The pull to the current lights that holds an answer which would lead away from the
             paint; None without.
         filter_share: The share of a Gaussian reconstruction filter whose effect was taken out of
-            the paintings, which are renders; 0 without one.
+            the paintings; 0 without one.
+        is_render: Whether the paintings are renders: what the lights make, but for noise, and so
+            without contrasts between wishes. None if noise hides that.
         given: The bases of the views of light groups whose renderer multiplies in other primaries,
             where the bases of the problem add up to its picture at one lighting; () for others.
 
@@ -163,6 +165,7 @@ class Problem(linear_problem.LinearProblem):
     tether: NormalEquations | None = None
     holding: NormalEquations | None = None
     filter_share: float = 0.0
+    is_render: bool | None = False
     given: tuple[Basis, ...] = ()
 
     __repr__ = short_repr

@@ -21,7 +21,7 @@ from lightpaint.lighting import (
     SurfaceColor,
     analyse,
     answer_as_multiplied,
-    answer_without_filter,
+    answer_to_render,
     choose_mixes,
     default_answer,
     hold_to_current,
@@ -188,8 +188,8 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
         solution = job_bases.without_noise(job, solution)
     finish = partial(_finish_answer, job)
-    with stage("filter of the painting", listen):
-        solution = answer_without_filter(answer_as_multiplied(solution), finish)
+    with stage("render as painting", listen):
+        solution = answer_to_render(answer_as_multiplied(solution), finish)
     solution = hold_to_current(solution, finish)
     for remark in answer_remarks(solution):
         listen.say(remark)

@@ -152,6 +152,21 @@ def answer_remarks(solution: Solution) -> list[Sentence]:
                 "the answer allows for its softer edges and halos"
             )
         )
+    elif problem.is_render:
+        remarks.append(
+            Sentence(
+                "the lights make all of the painting but noise, as of a render: it is fitted as it "
+                "is, and noise makes no wishes"
+            )
+        )
+    elif problem.is_render is None:
+        remarks.append(
+            Sentence(
+                "noise hides whether the painting is a render: it is read as a sketch (",
+                Hint("literal", True),
+                " fits it as light)",
+            )
+        )
     if problem.holding is not None:
         remarks.append(
             Sentence(

@@ -109,6 +109,7 @@ def _without(problem: Problem, change: Doubles, share: float) -> Problem:
         corrected=None,
         noise_removed=0.0,
         filter_share=share,
+        is_render=True,
         **vars(replace(terms, contrast=None)),
     )
 

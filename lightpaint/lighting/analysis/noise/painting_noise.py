@@ -134,7 +134,7 @@ def painting_grain(solution: Solution, D: Doubles, r: Doubles, r_half: Doubles) 
 
 def _rendered_share(solution: Solution, light: Floats, r: Doubles, r_half: Doubles) -> float:
     """Return how far a painting counts as a render, 0 to 1. light: (p, 3), the prediction."""
-    if solution.problem.filter_share:
+    if solution.problem.is_render:
         return 1.0
     unit = np.abs(light) + DARK * float(np.abs(light).mean(dtype=np.float64))
     D = (solution.importance.reshape(-1, 1) > 0) / np.square(np.where(unit > 0, unit, 1))

@@ -127,7 +127,7 @@ class ReadingNoise:
         problem, nothing = solution.problem, np.zeros_like(solution.weights)
         count = PAIRS if len(solution.weights) < MANY_LIGHTS else FEW_PAIRS
         reads_wishes = problem.fit.reads_wishes(is_sketch=are_sketches(problem.views))
-        if not reads_wishes or problem.filter_share:
+        if not reads_wishes or problem.is_render:
             return cls(nothing, nothing, nothing, count)
         views = problem.views
         blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
