@@ -55,13 +55,17 @@ def describe_sum(
     truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
     lossy = ", ".join(dict.fromkeys(layer.compression for layer in layers if _is_lossy(layer)))
     if truly_missing + truly_exceeding <= negligible_share(layers):
-        deviation = f"to {missing + exceeding:.1g} of its light"
-        if lossy and missing + exceeding > NEGLIGIBLE_SHARE:
-            deviation += (
-                f", as exactly as the lossy compression {lossy} stores them, which may hide a lamp "
-                f"of up to {share_text(hidden_share(layers, whole))} of it"
-            )
-        return f"the groups add up to the beauty ({deviation})", False
+        sentence = "the groups add up to the beauty"
+        if (deviation := missing + exceeding) <= NEGLIGIBLE_SHARE:
+            return sentence, False
+        if not lossy:
+            return f"{sentence} (but for {share_text(deviation)}, which is rounding)", False
+        return (
+            f"{sentence} (but for {share_text(deviation)}), as exactly as the lossy compression "
+            f"{lossy} stores them, which may hide a lamp of up to "
+            f"{share_text(hidden_share(layers, whole))} of it",
+            False,
+        )
     text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
         f"the missing part becomes the fixed light {name}"
