@@ -3,12 +3,12 @@
     python benchmarks/difficult_scenes.py [--scenes glass screen ...] [--seeds 6] [--spp 32]
     python benchmarks/difficult_scenes.py --quick
 
-Small scenes, each with one difficulty: a bulb in glass and a lamp in a mirror, which paths find
-by chance; a screen, a textured area light in view; a hall with 48 lamps; a dome, an environment
-map; a sun with its sky; fog, for which each light is rendered by itself; masked and textured
-surfaces; spots with a profile of rings, as photometric files have. Paintings of each are solved as
-linear light: three that a mix of its lights makes exactly, in turns, and one with a pattern of
-squares that no mix makes. Printed are, over bases of that many samples with other seeds:
+Small scenes, each with one difficulty: a bulb in glass, four of them, and a lamp in a mirror, which
+paths find by chance; a screen, a textured area light in view; a hall with 48 lamps; a dome, an
+environment map; a sun with its sky; fog, for which each light is rendered by itself; masked and
+textured surfaces; spots with a profile of rings, as photometric files have. Paintings of each are
+solved as linear light: three that a mix of its lights makes exactly, in turns, and one with a
+pattern of squares that no mix makes. Printed are, over bases of that many samples with other seeds:
 
 - `held`: how often 95 % intervals hold the weights that a basis of 64 times the samples gives, over
   channels of lights that are on, and `told`, the same without lights of which an answer says that
@@ -86,6 +86,15 @@ PROFILED_SPOT = """<emitter type="spot" id="profile_{k}"><transform name="to_wor
         <texture type="bitmap" name="texture"><string name="filename" value="rings.exr"/>
         <boolean name="raw" value="true"/></texture></emitter>"""
 
+BULB_IN_GLASS = """<shape type="sphere" id="bulb_{k}"><point name="center" x="{x}" y="{y}" z="{z}"/>
+        <float name="radius" value="0.03"/>
+        <emitter type="area"><rgb name="radiance" value="60 45 30"/></emitter></shape>
+    <shape type="sphere"><point name="center" x="{x}" y="{y}" z="{z}"/>
+        <float name="radius" value="0.12"/><bsdf type="dielectric"/></shape>"""
+
+#: Where four bulbs hang that are seen.
+BULB_PLACES = ((1.2, 1.2, -0.6), (-1.3, 1.0, -0.7), (0.3, 1.7, -0.8), (0.7, 1.5, 0.6))
+
 OUTDOORS = """<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="6"/></integrator>
     <sensor type="perspective" id="camera"><float name="fov" value="50"/>
@@ -131,6 +140,9 @@ def hall(folder: Path) -> str:
 #: The text of each scene, made beside its pictures in a folder.
 SCENES: dict[str, Callable[[Path], str]] = {
     "glass": room(HARD_LAMPS["glass"]),
+    "bulbs": room(
+        "".join(BULB_IN_GLASS.format(k=k, x=x, y=y, z=z) for k, (x, y, z) in enumerate(BULB_PLACES))
+    ),
     "mirror": room(HARD_LAMPS["mirror"]),
     "screen": room(SCREEN),
     "48 lamps": hall,

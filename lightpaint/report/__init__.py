@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from lightpaint.report.contact_sheet import light_sheet
     from lightpaint.report.diagnosis_sentences import (
         ALONE_ADVICE, ANY_COLOR, NO_ERROR, bound_sentences, compensation_sentences, error_sentences,
-        fit_sentence, hold_clause, is_one_painting, named_worst_wish, partly_reached, spoken_about,
+        fit_sentence, is_one_painting, named_worst_wish, partly_reached, reach_clause, spoken_about,
         spoken_came, spoken_cause, spoken_errors, spoken_mean_shares, spoken_newest, spoken_shares,
         uncertainty_sentence, unreached_channels, untold_lights,
     )

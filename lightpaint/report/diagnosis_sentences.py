@@ -95,9 +95,11 @@ MAX_WISHES = 4
 #: Share of an only wish below which a headline begins with its being out of reach.
 HALF = 0.5
 
-#: What may bring a wish: where no light reaches it, where none reaches it alone, where a light for
-#: it lights something else, too, and where the light that makes it is not adjusted.
+#: What may bring a wish: where no light reaches it, where none reaches it alone (in a picture that
+#: is painted everywhere, and in others), where samples hide it, where a light for it lights
+#: something else, too, and where the light that makes it is not adjusted.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
+NEW_LIGHT_ADVICE = "Add a light for it."
 ALONE_ADVICE = "Add a light for it, or paint the rest as well."
 SAMPLES_ADVICE = "Render more samples."
 SPILL_ADVICE = "More importance, or lights that move, may help."
@@ -121,7 +123,7 @@ def error_sentences(
     # Fixed lights have a separate bound below.
     lights = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
-        "unreachable": f"is out of reach of any mix of {lights}{hold_clause(appearance)}",
+        "unreachable": f"is out of reach of any mix of {lights}{reach_clause(appearance)}",
         "forbidden": "would need other limits of the lights or light below zero"
         if d.is_constrained
         else "would need light below zero",
@@ -146,10 +148,17 @@ def spoken_shares(diagnosis: Diagnosis) -> dict[str, str]:
     return dict(zip(parts, spoken_percents(parts.values()), strict=True))
 
 
-def hold_clause(appearance: Appearance | None) -> str:
-    """Return ` while the rest is held` if that keeps the lights from the paint, else ""."""
-    is_held = appearance is not None and any(reason.kind == "hold" for reason in appearance.reasons)
-    return " while the rest is held" if is_held else ""
+def reach_clause(appearance: Appearance | None) -> str:
+    """Return on what it depends that light is out of reach; "" if on nothing but the lights.
+
+    ` as these samples show them` of lights, if samples do not determine a light for it; ` while the
+    rest is held` if that keeps the lights from the paint.
+    """
+    if appearance is None:
+        return ""
+    is_held = any(reason.kind == "hold" for reason in appearance.reasons)
+    shown = " as these samples show them" if appearance.is_hidden_by_noise else ""
+    return f"{shown} while the rest is held" if is_held else shown
 
 
 def bound_sentences(
@@ -197,6 +206,11 @@ def compensation_sentences(names: Sequence[str]) -> list[str]:
         "because unpainted parts are held, and other lights would brighten them: paint what "
         f"{'it lights, or lock it' if is_one else 'they light, or lock them'}."
     ]
+
+
+def alone_advice(appearance: Appearance) -> str:
+    """Return what may bring light to a place that no light reaches alone."""
+    return NEW_LIGHT_ADVICE if appearance.is_painted_everywhere else ALONE_ADVICE
 
 
 def spoken_about(appearance: Appearance) -> str:

@@ -191,7 +191,7 @@ def spoken_lack(appearance: lighting.Appearance, wish: lighting.Delivery) -> str
         else diagnosis_sentences.REACH_ADVICE
     )
     if is_reached and appearance.lacks_light_of_its_own:
-        advice = diagnosis_sentences.ALONE_ADVICE
+        advice = diagnosis_sentences.alone_advice(appearance)
     if appearance.local_lights[:1] == appearance.fixed_lights[:1] != ():
         advice = diagnosis_sentences.FIXED_ADVICE
     return f"{diagnosis_sentences.spoken_unreached(wish)}, since {reason}. {advice}"
@@ -209,8 +209,8 @@ def _paint_headline(appearance: lighting.Appearance) -> str:
     if diagnosis_sentences.lacks_only_wish(appearance) and not appearance.is_nearly_equal:
         missing = spoken_missing(appearance)
         text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(appearance)}."
-        advice = f" {diagnosis_sentences.ALONE_ADVICE}" if appearance.lacks_light_of_its_own else ""
-        return f"{diagnosis_sentences.spoken_came(appearance)}. {text}{advice}"
+        came = diagnosis_sentences.spoken_came(appearance)
+        return " ".join(filter(None, [f"{came}.", text, _advice_on_paint(appearance)]))
     if appearance.is_far:
         where = phrases.spoken_where(appearance.place)
         change = phrases.spoken_difference(appearance.place.painted, appearance.place.reached)
@@ -221,6 +221,14 @@ def _paint_headline(appearance: lighting.Appearance) -> str:
     )
     start, missing = _headline_start(appearance), spoken_missing(appearance)
     return f"{start} the {missing} {state}: {spoken_reason(appearance)}."
+
+
+def _advice_on_paint(appearance: lighting.Appearance) -> str:
+    """Return what may bring the only wish; "" if nothing is known to."""
+    if appearance.is_hidden_by_noise and not appearance.causes:
+        return diagnosis_sentences.SAMPLES_ADVICE
+    is_alone = appearance.lacks_light_of_its_own
+    return diagnosis_sentences.alone_advice(appearance) if is_alone else ""
 
 
 def _headline_start(appearance: lighting.Appearance) -> str:

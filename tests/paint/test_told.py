@@ -161,6 +161,7 @@ def test_where_no_light_reaches_the_paint_alone_a_new_one_is_advised():
     )
     assert advice(appearance) == Advice("light", (), None, None)
     assert advice(replace(appearance, reasons=(), local_lights=("sky",))) == advice(appearance)
+    assert advice(replace(appearance, reasons=(), undetermined_lights=("sky",))) is None
     # With a light of its own, the hold is what keeps it.
     own = replace(appearance, area_lights=OWN)
     assert "held near their current look. Paint more or loosen the hold." in sketch_headline(own)

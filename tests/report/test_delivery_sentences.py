@@ -87,6 +87,34 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             "floor, too. Add a light for it, or paint the rest as well. Rim: 95 %. On the whole: "
             "about half way.",
         ),
+        # Where all is painted, there is no rest to paint.
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("sun",),
+                area_lights=AreaLights(("sky",), is_alone=False, also="floor"),
+                reasons_wish="Lantern",
+                is_painted_everywhere=True,
+            ),
+            "Lantern: out of reach (8 % came), since no light reaches it alone; sky lights the "
+            "floor, too. Add a light for it. Rim: 95 %. On the whole: about half way.",
+        ),
+        # What samples do not tell of a light is no matter of its reach.
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("sun", "bulb"),
+                area_lights=AreaLights(("sky",), is_alone=False, also="floor"),
+                reasons_wish="Lantern",
+                undetermined_lights=("bulb",),
+            ),
+            "Lantern: 8 %: too few samples tell what bulb can do there. Render more samples. Rim: "
+            "95 %. On the whole: about half way.",
+        ),
         # Where shadow is missing, nothing has to reach it.
         (
             _seen(

@@ -185,6 +185,11 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
     *_, diagnosis = _solved(make_basis)
     appearance = Appearance(12.0, 0.0, 20.0)
     assert "is out of reach of any mix of the lights," in error_sentences(diagnosis, appearance)[0]
+    hidden = replace(appearance, local_lights=("bulb",), undetermined_lights=("bulb",))
+    assert (
+        "is out of reach of any mix of the lights as these samples show them,"
+        in error_sentences(diagnosis, hidden)[0]
+    )
     with_hold = replace(appearance, reasons=(Reason("hold", (), 0.7),))
     assert (
         "is out of reach of any mix of the lights while the rest is "

@@ -386,7 +386,7 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     words = MISS_TEXTS | (
         CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
-    words |= {"unreachable": MISS_TEXTS["unreachable"] + report.hold_clause(appearance)}
+    words |= {"unreachable": MISS_TEXTS["unreachable"] + report.reach_clause(appearance)}
     shares = [f"{share} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of the difference (large errors count most), {', '.join(shares)}."]
     if appearance.place is None and diagnosis.place is not None:
@@ -406,7 +406,7 @@ def advice(appearance: Appearance) -> protocol.Advice | None:
     """Return the same as data for a page's button: the obstacle to remove, and the gain."""
     if (cause := removable_reason(appearance)) is None:
         is_missed = not appearance.is_close and appearance.place is not None
-        if not is_missed or appearance.causes:
+        if not is_missed or appearance.causes or appearance.is_hidden_by_noise:
             return None
         is_for_new = appearance.lacks_light_of_its_own and appearance.has_strong_light
         return protocol.Advice("light" if is_for_new else "reach", (), None, None)

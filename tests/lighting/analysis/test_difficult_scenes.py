@@ -15,6 +15,7 @@ SEEDS = 3
 #: The scenes, and the lights of each whose weights vary by themselves from seed to seed.
 SCENES = {
     "glass": 4,
+    "bulbs": 7,
     "mirror": 4,
     "screen": 4,
     "48 lamps": 48,
@@ -32,11 +33,7 @@ STUDENT_T = 31.6
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", SCENES)
 def test_answers_hold_in_a_difficult_scene(tmp_path: Path, name: str) -> None:
-    rows = tmp_path / "rows.csv"
-    command = [sys.executable, str(BENCHMARK), "--scenes", name, "--seeds", str(SEEDS)]
-    subprocess.run([*command, "--csv", str(rows)], check=True, capture_output=True, text=True)
-    with rows.open(newline="", encoding="utf-8") as file:
-        [row] = csv.DictReader(file)
+    row = _measured(tmp_path, name, "--seeds", str(SEEDS))
     assert row["wrong"] == "0"
     assert float(row["unmet"]) == 1
     error = float(row["standard error"])
@@ -46,3 +43,18 @@ def test_answers_hold_in_a_difficult_scene(tmp_path: Path, name: str) -> None:
     # Two answers of each seed; channels of a light miss together.
     answers = 2 * SEEDS * SCENES[name]
     assert float(row["held"]) >= 0.95 - 4 * np.sqrt(0.95 * 0.05 / answers)
+
+
+@pytest.mark.nightly
+def test_nothing_is_out_of_reach_of_bulbs_that_few_samples_find(tmp_path: Path) -> None:
+    assert _measured(tmp_path, "bulbs", "--seeds", "9", "--spp", "4")["wrong"] == "0"
+
+
+def _measured(folder: Path, name: str, *options: str) -> dict[str, str]:
+    """Measure a scene, and return its row."""
+    rows = folder / "rows.csv"
+    command = [sys.executable, str(BENCHMARK), "--scenes", name, *options, "--csv", str(rows)]
+    subprocess.run(command, check=True, capture_output=True, text=True)
+    with rows.open(newline="", encoding="utf-8") as file:
+        [row] = csv.DictReader(file)
+    return row

@@ -100,6 +100,7 @@ class Appearance:
         undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`), or not
             well enough to tell what is missing at the place: what they could do is not known. Empty
             if errors of lights were not computed.
+        is_painted_everywhere: Whether all of the picture is painted, so that nothing else can be.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -125,6 +126,7 @@ class Appearance:
     reasons_wish: str = ""
     compensating_lights: tuple[str, ...] = ()
     undetermined_lights: tuple[str, ...] = ()
+    is_painted_everywhere: bool = False
 
     __repr__ = short_repr
 
@@ -347,6 +349,7 @@ def compare_appearance(
         look.mean(look.difference(now)),
         deliveries=delivered.deliveries,
         lit_delta_e=delivered.lit_delta_e,
+        is_painted_everywhere=all(target.everything for target in problem.views.targets),
     )
     if len(problem.views) > 1:
         return appearance
@@ -371,10 +374,16 @@ def with_undetermined(
     appearance: Appearance, view: Solution, uncertainty: Uncertainty
 ) -> Appearance:
     """Return the appearance of a view with the lights that its samples do not determine."""
-    names = {x for x, is_so in zip(view.basis.names, uncertainty.untold, strict=True) if is_so}
-    if appearance.place is not None:
-        names.update(undetermined_at(view, appearance.place, uncertainty))
-    return replace(appearance, undetermined_lights=tuple(x for x in view.basis.names if x in names))
+    names = view.basis.names
+    untold = [x for x, is_so in zip(names, uncertainty.untold, strict=True) if is_so]
+    place = appearance.place
+    there = () if place is None else undetermined_at(view, place, uncertainty)
+    return replace(
+        appearance,
+        # What its error may bring to the place, a light can bring there.
+        local_lights=tuple(dict.fromkeys((*appearance.local_lights, *there))),
+        undetermined_lights=tuple(x for x in names if x in {*untold, *there}),
+    )
 
 
 def _worst_area(appearance: Appearance, delivered: DeliveryReport) -> Floats | None:
