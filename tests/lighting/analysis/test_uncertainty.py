@@ -326,6 +326,36 @@ def test_a_light_that_the_paint_hardly_shows_is_undetermined_alone(make_basis: A
     assert bars.untold.tolist() == [False, False, False, True, True]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_lights_by_stray_paths_are_undetermined_alone(make_basis: Any, seed: int) -> None:
+    """Two lights shine elsewhere, and the paint shows a few stray paths of them, one in a pixel."""
+    clean, rng = _pools(), np.random.default_rng(seed)
+    images, halves = _noisy_halves(clean, 0.02, rng)
+    mask = np.zeros(SIZE, np.float32)
+    mask[:, :12] = 1
+    for k in (3, 4):
+        is_hit = rng.random((SIZE[0], 12, 1)) < 0.02
+        path = 1e-3 * is_hit * rng.exponential(1, is_hit.shape)
+        images[k, :, :12] = path
+        halves[k, :, :12] = path * rng.choice((-1, 1), is_hit.shape)
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0.8], clean[:3])
+    # What no light makes pulls at them, too.
+    image += 0.03 * rng.choice((-1, 1), (*SIZE, 1))
+    target = Target("t", image.astype(np.float32), mask, everything=False)
+    basis = make_basis(images=images, half_differences=halves)
+    names = [light.name for light in basis.lights]
+    locked = Constraints.of(light={name: {"lock": True} for name in names[3:]})
+    widths = []
+    for constraints in (None, locked):
+        bars = error_bars(solve(basis, target, constraints=constraints))
+        assert bars is not None
+        assert not bars.untold[:3].any()
+        low, high = bars.interval
+        widths.append((high - low)[:3])
+    # At ten times their levels the two would add as much as these intervals are wide.
+    assert (widths[0] < 3 * widths[1]).all()
+
+
 def test_noise_of_a_render_that_is_the_painting_is_in_the_intervals(make_basis: Any) -> None:
     """Over seeds of the painting: its scatter is what is stated, and the intervals hold."""
     clean, rng = _pools(), np.random.default_rng(5)

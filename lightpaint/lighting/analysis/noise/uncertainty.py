@@ -88,6 +88,9 @@ DOUBT_RANGE = 0.6, 0.8
 #: Standard errors on the safe side of a sum, and the least share of M that remains of a light.
 SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
 
+#: Times its level, solved or current, that a light in doubt may have where others make up for it.
+MAX_LEVEL = 10.0
+
 #: Changes of an inverse that are collected: one by one each takes a walk over the matrix.
 COLUMNS_AT_A_TIME = 32
 
@@ -390,7 +393,7 @@ def error_bars(
     moved = np.zeros_like(weights)
     if weak is not None:
         spread, of_interval = (x.mixed_with(weak[0], doubts) for x in (spread, of_interval))
-        moved = weak[1] - center
+        moved = _moved_by_doubt(solution, doubts, weak[1] - center)
     by_poses, reading = _scatter_by_poses(solution, level_errors), ReadingNoise.of(solution)
     sides, wide = [], []
     beyond = reading.below, reading.above
@@ -437,6 +440,20 @@ def _where_lights_are_noise(
     far = solve_for(solution, equations)
     response = WeightResponse(solution, equations, equations, far)
     return doubts, (response.spread(noise.full_covariance), far)
+
+
+def _moved_by_doubt(solution: Solution, doubts: Doubles, moved: Doubles) -> Doubles:
+    """Return how far weights move, (n, 3), if the lights in doubt have as little power as they may.
+
+    A light that hardly reaches the paint could be thousands of times as bright then, and others
+    would make up for it. They move as far as it takes to bring every light in doubt to MAX_LEVEL
+    times its solved or current level, at most. moved: (n, 3), of the answer with so little power.
+    """
+    levels = np.maximum(solution.weights, solution.basis.current_weights).max(axis=1, keepdims=True)
+    is_moved = (doubts > 0) & (moved != 0)
+    room = np.divide(MAX_LEVEL * levels, np.abs(moved), out=np.ones_like(moved), where=is_moved)
+    share = np.minimum(room, 1).min(axis=0)
+    return np.asarray(moved * (doubts + (1 - doubts) * share))
 
 
 def _painting_covariance(solution: Solution) -> tuple[Doubles, Doubles] | None:
