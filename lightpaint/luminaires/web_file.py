@@ -40,6 +40,7 @@ END_OF_FILE = "\x1a"
 MAX_KEYWORDS = 1000
 
 _TILT = re.compile(r"\s*TILT\s*=\s*(.*?)\s*$", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"\b\d{1,20},\d{1,20}\b")
 _KEYWORD = re.compile(r"\s*\[(\w+)\]\s*(.*?)\s*$")
 
 #: Longest file in bytes.
@@ -117,14 +118,38 @@ def parse_lm63(text: str) -> PhotometricWeb:
     for k, line in enumerate(lines[: MAX_KEYWORDS + 1]):
         if tilt := _TILT.match(line):
             text = " ".join(lines[k + 1 :]).removesuffix(END_OF_FILE)
-            numbers = Numbers(text.replace(",", " ").split())
-            tilt_factors = _tilt_factors(tilt[1], numbers)
-            web = _parse_numbers(numbers, name, is_of_2019=edition.endswith("LM-63-2019"))
-            return replace(web, tilt_factors=tilt_factors, unread=numbers.left)
+            is_of_2019 = edition.endswith("LM-63-2019")
+            _check_commas(text, tilt[1])
+            return _parse_body(text.replace(",", " "), tilt[1], name, is_of_2019=is_of_2019)
         keyword = _KEYWORD.match(line)
         if keyword and keyword[1].upper() in ("LUMINAIRE", "LUMCAT") and keyword[2]:
             name = name if keyword[1].upper() == "LUMCAT" and name else one_line(keyword[2])
     raise SceneError("it has no line TILT=: it is not an IES file (LM-63)")
+
+
+def _parse_body(text: str, tilt: str, name: str, *, is_of_2019: bool) -> PhotometricWeb:
+    """Return the web in what follows the tilt, numbers with blanks between them."""
+    numbers = Numbers(text.split())
+    tilt_factors = _tilt_factors(tilt, numbers)
+    web = _parse_numbers(numbers, name, is_of_2019=is_of_2019)
+    return replace(web, tilt_factors=tilt_factors, unread=numbers.left)
+
+
+def _check_commas(text: str, tilt: str) -> None:
+    """Raise SceneError for a file whose numbers are as many as it announces only if its commas are
+    decimal ones: in LM-63 they stand between numbers.
+    """
+    if (decimal := _DECIMAL_COMMA.search(text)) is None:
+        return
+    try:
+        web = _parse_body(text.replace(",", "."), tilt, "", is_of_2019=False)
+    except SceneError:
+        return
+    if not web.unread:
+        raise SceneError(
+            f"its numbers have decimal commas, as {decimal[0]}, which part two numbers in an IES "
+            f"file: write {decimal[0].replace(',', '.')}"
+        )
 
 
 def _tilt_factors(tilt: str, numbers: Numbers) -> Doubles | None:

@@ -151,6 +151,21 @@ def test_wrong_factors_of_a_tilted_lamp_are_refused(tmp_path: Path, tilt: str, r
         _read(tmp_path, ies_text(cosine, tilt=tilt))
 
 
+def test_decimal_commas_are_named(tmp_path: Path) -> None:
+    """In LM-63 a comma stands between numbers, which are then twice as many."""
+    head, body = ies_text(cosine).split("TILT=NONE")
+    angles = "1 1000 1 3 1 1 2 0 0 0 1 1 20 0 45 90 0 "
+    for numbers in ("1000,5 707,25 0,0", "1000 707,5 0"):
+        with pytest.raises(
+            SceneError, match=r"lamp\.ies: its numbers have decimal commas, as \d+,"
+        ):
+            _read(tmp_path, f"{head}TILT=NONE\n{angles}{numbers}")
+    plain = _read(tmp_path, ies_text(cosine))
+    for separator in (", ", ","):
+        read = _read(tmp_path, f"{head}TILT=NONE\n{separator.join(body.split())}")
+        np.testing.assert_array_equal(read.table, plain.table)
+
+
 def test_what_follows_after_the_last_intensity_is_told(tmp_path: Path) -> None:
     whole = _read(tmp_path, ies_text(cosine))
     assert unread_remark(whole, "lamp.ies") is None
