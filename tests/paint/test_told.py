@@ -106,6 +106,7 @@ def test_a_sketch_is_helped_and_not_judged(miss: float, fields: Any, sentence: s
         ({"reasons": (HOLD,)}, "hold"),
         ({"reasons": (COLORS, SIDE)}, "colors"),
         ({"reasons": (SIDE,)}, None),
+        ({"reasons": (replace(OFF, kind="emitters"),)}, None),
         ({"reasons": (OFF, HOLD)}, "off"),  # the first reason is told alone
         ({"reasons": (replace(OFF, share=0.3),)}, "reach"),
         ({"reasons": ()}, "reach"),

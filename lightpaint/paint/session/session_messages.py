@@ -395,11 +395,13 @@ def why_not_closer(analysis: Analysis) -> list[str]:
 
 
 def removable_reason(appearance: Appearance) -> Reason | None:
-    """Return the reason in `sketch_headline`, if the user can remove it."""
+    """Return the reason in `sketch_headline`, if the user can remove it: neither what other views
+    ask for, nor what a lamp is made of.
+    """
     if appearance.is_close or appearance.place is None or not appearance.causes:
         return None
     first = appearance.causes[0]
-    return None if first.kind == "views" else first
+    return None if first.kind in ("views", "emitters") else first
 
 
 def advice(appearance: Appearance) -> protocol.Advice | None:
