@@ -232,7 +232,10 @@ def opened_openraster(
         with naming_damage():
             archive = open_things.enter_context(zipfile.ZipFile(path))
             if _member(archive, STACK).file_size > MAX_STACK:
-                raise ImageError("declares a list of layers that is too long")
+                raise ImageError(
+                    f"declares a list of layers that is too long: expected at most {MAX_STACK >> 20} MB; "
+                    "merge some"
+                )
             text = archive.read(STACK)
             if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
                 raise ImageError("has a list of layers with declarations of its own: save it again")
@@ -342,7 +345,10 @@ def _number(element: ElementTree.Element, key: str, default: float) -> float:
 
 def _check_size(height: int, width: int) -> None:
     if min(height, width) < 1 or height * width > MAX_PIXELS:
-        raise ImageError(f"declares {width}x{height} pixels")
+        raise ImageError(
+            f"declares {width}x{height} pixels: expected at least 1, and at most "
+            f"{MAX_PIXELS / 1e6:.0f} million"
+        )
 
 
 def _placed(
