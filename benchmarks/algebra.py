@@ -21,13 +21,13 @@ from scipy.optimize import nnls
 
 from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.planes import BLOCK_PIXELS
+from lightpaint.basis.planes import BLOCK_PIXELS, MemoryPlanes
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.normal_equations import NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import reduce_to
@@ -80,7 +80,8 @@ def gram(repeats: int, rows: Rows) -> None:
                 for _ in range(int(blocks)):
                     plain @ plain.T
 
-        ours_s = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
+        sums = partial(MemoryPlanes(images).sums, importance, target)
+        ours_s = timed(sums, repeats)
         base = timed(product, repeats)
         rows[n][f"normal equations, {WIDTH}x{HEIGHT}, ms"] = least_ms(ours_s)
         print(
@@ -189,7 +190,7 @@ def looks() -> None:
     print("\nlooks a second from one basis, M given (three channels each)")
     for n in (12, 64):
         images, target, importance = picture(n)
-        M, b, norm2 = inner_products(images, target, importance)
+        M, b, norm2 = MemoryPlanes(images).sums(importance, target)
         rng, free_reduction = np.random.default_rng(2), reduce_to(Constraints(), lights(n))
         weights, count = np.ones((n, 3)), 0
         start = time.perf_counter()

@@ -5,11 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.target.painted_target import Target
+
+
+def inner_products(images: Any, target: Any, importance: Any) -> tuple[Any, Any, Any]:
+    """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of images (n, h, w, 3) and a target (h, w, 3)."""
+    return MemoryPlanes(images).sums(importance, target)
 
 
 def stack_rows(basis: Any, target: Target) -> tuple[Any, Any]:

@@ -7,10 +7,10 @@ from threading import Barrier, get_ident
 
 import numpy as np
 import pytest
+from least_squares import inner_products
 from patience import PATIENCE_S
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.threads import limit_jobs, one_thread, parallel_map
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis import Basis, MemoryPlanes
+from lightpaint.basis import Basis
 from lightpaint.errors import LightingError, SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.validation import check_shape
@@ -108,14 +108,3 @@ def block_diagonal(M: Doubles) -> Doubles:
     for c in range(3):
         whole[c, :, c] = M[c]
     return whole.reshape(3 * n, 3 * n)
-
-
-def inner_products(
-    images: Floats, target: Floats, importance: Floats
-) -> tuple[Doubles, Doubles, Doubles]:
-    """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) under the pixel weights `importance`.
-
-    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where it
-    differs between the channels, >= 0.
-    """
-    return MemoryPlanes(images).sums(importance, target)

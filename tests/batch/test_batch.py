@@ -450,15 +450,6 @@ def test_two_batches_do_not_work_in_one_folder(batch_folder: Path) -> None:
     assert remarks == [1]
 
 
-def test_tasks_are_the_same_wherever_they_are_sent(batch_folder: Path) -> None:
-    for look in plan_batch(batch_folder / "looks.toml", batch_folder / "out").looks:
-        for step in look.steps:
-            assert Task.from_json(step.task.to_json()) == step.task
-    for text in ("", "[]", "{}", '{"format": "lightpaint-task 1", "share": "a"}'):
-        with pytest.raises(BatchError, match="this is not a task"):
-            Task.from_json(text)
-
-
 class _AtWork:
     """Listens to what each worker does."""
 

@@ -1,7 +1,6 @@
 """Looks of a batch that share places: one search, one render of what moved, levels for each."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -178,7 +177,6 @@ def test_a_job_with_places_is_sent_and_read_again(folder: Path) -> None:
     moved_task = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
     assert moved_task.places == "/elsewhere/out/places/day.json"
     assert json.loads(moved_task.job)["placement"] == {"path": moved_task.places}
-    assert moved_task == replace(type(task).from_json(moved_task.to_json()))
 
 
 def test_an_interrupt_amid_the_search_leaves_no_places(folder: Path) -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from least_squares import inner_products
 
 from lightpaint.basis.planes import BLOCK_PIXELS
-from lightpaint.lighting.normal_equations import NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations
 
 # Sums of float64 products, a few thousand of them: round-off well below 1e-12.
 PRECISION = 1e-12

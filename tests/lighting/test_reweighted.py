@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from least_squares import inner_products
 from nightly import nightly, seeds
 from scipy.optimize import minimize, nnls
 
@@ -25,7 +26,6 @@ from lightpaint.lighting.loss import lit_pixels, painting_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.loss.pixel_loss import image_of, planes_of
-from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve_again

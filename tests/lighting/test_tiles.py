@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from least_squares import inner_products
 from nightly import examples
 
 from lightpaint.errors import SizeError
 from lightpaint.lighting.live.tiles import MAX_SUM_BYTES, TiledEquations, tile_side
-from lightpaint.lighting.normal_equations import NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations
 
 HEIGHT, WIDTH = 21, 30
 

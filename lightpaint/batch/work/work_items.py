@@ -14,10 +14,8 @@ from lightpaint.basis.render import Part
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, Final, Handover, Space
 from lightpaint.colour import Observer
-from lightpaint.errors import BatchError
 from lightpaint.lighting import Emitters
 from lightpaint.scene.quality_presets import Quality
-from lightpaint.storage.json_records import read_record, strict_json
 
 #: Map from a path to that on another machine.
 PathMap = Callable[[str], str]
@@ -25,7 +23,6 @@ PathMap = Callable[[str], str]
 #: Seconds of a sample of one pixel for all lights together, and in addition for each light.
 SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
 
-FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 
 #: Steps: the answer, its final render, and exports for other programs.
 Kind = Literal["answer", "render", "export"]
@@ -314,7 +311,6 @@ class Task:
     places: str = ""
     expected_s: float = 0.0
     is_by_sums: bool = False
-    format: Literal["lightpaint-task 1"] = FORMAT
 
     @property
     def name(self) -> str:
@@ -357,23 +353,6 @@ class Task:
             former_look_files=tuple(file and move(file) for file in self.former_look_files),
             places=self.places and move(self.places),
         )
-
-    def to_json(self) -> str:
-        """Return this task as text, for another process."""
-        return json.dumps(asdict(self))
-
-    @staticmethod
-    def from_json(text: str) -> "Task":
-        """Return the task that `to_json` wrote. Raises BatchError for anything else."""
-        try:
-            data = strict_json(text)
-            numbers = {
-                key: data.pop(key) for key in ("expected_s", "mireds", "share") if key in data
-            }
-            return read_record(Task, {**data, **{k: float(v) for k, v in numbers.items()}})
-        except (AttributeError, TypeError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise BatchError(f"this is not a task: {reason}; make one with Task.to_json") from None
 
 
 def answer_task(

@@ -58,18 +58,6 @@ class FreeFactor:
         move[rows] = self._factored(rows, -gradient[rows])
         return move
 
-    def divided(self, free: Bools, right: Doubles) -> Doubles:
-        """Return M⁻¹ `right` of the free unknowns, (n, j), 0 for the others. free: (n,)."""
-        quotients, rows = np.zeros(right.shape), np.flatnonzero(free & self._counts)
-        if not rows.size:
-            return quotients
-        if self._factor is not None and np.array_equal(rows, self._rows):
-            lapack, _ = large_libraries()
-            quotients[rows] = lapack.dpotrs(self._factor, right[rows], lower=1)[0]
-        else:
-            quotients[rows] = self._factored(rows, right[rows])
-        return quotients
-
     def knows_regular(self, free: Bools) -> bool:
         """Return whether the matrix of these unknowns, (n,), is known not to be nearly
         singular."""
