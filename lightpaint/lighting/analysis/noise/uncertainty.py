@@ -367,24 +367,11 @@ def error_bars(
     step = _GradientStep.of(solution, noise)
     unbiased = step.equations(denoised_matrix(problem.equations, noise.power))
     bias = np.asarray(solve_for(solution, unbiased) - weights)
-
-    # A step from a render of the mix has the unbiased M.
-    is_unbiased = problem.refinement is not None or problem.noise_removed >= NEARLY_ALL
-    covariance, center = noise.full_covariance, weights + bias
+    center = weights + bias
     painted = _painting_covariance(solution) if with_painting else None
-    spreads = []
-    steady = unbiased
-    if noise.hidden.any():
-        steady = step.equations(denoised_matrix(problem.equations, noise.steady_power))
-    for scatters in [steady] if is_unbiased else [problem.solved, steady]:
-        response = WeightResponse(solution, scatters, unbiased, center)
-        painting = np.zeros_like(weights) if painted is None else response.spread(painted[0]).inside
-        spreads.append((response.spread(covariance), painting))
-        del response  # of many lights it is large
-    # The interval is around the answer without bias, which scatters by its own M.
-    (spread, by_painting), (of_interval, wide_by_painting) = spreads[0], spreads[-1]
-    if painted is not None:
-        wide_by_painting = wide_by_painting * t_ratios(painted[1])
+    (spread, by_painting), (of_interval, wide_by_painting) = _spreads(
+        solution, noise, step, unbiased, center, painted
+    )
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
@@ -418,6 +405,41 @@ def error_bars(
         & _is_wide(weights, interval),
         problem.filter_share > 0,
     )
+
+
+#: A spread by noise of the basis, and deviations by noise of the painting, (n, 3).
+_Spreads = tuple[WeightSpread, Doubles]
+
+
+def _spreads(
+    solution: Solution,
+    noise: Noise,
+    step: "_GradientStep",
+    unbiased: NormalEquations,
+    center: Doubles,
+    painted: tuple[Doubles, Doubles] | None,
+) -> tuple[_Spreads, _Spreads]:
+    """Return the spread of the answer, and of the interval: around the answer without bias, which
+    scatters by its own M.
+
+    unbiased: the equations without noise. center: (n, 3), their answer. painted: see
+    `_painting_covariance`.
+    """
+    problem, covariance, steady = solution.problem, noise.full_covariance, unbiased
+    # A step from a render of the mix has the unbiased M.
+    is_unbiased = problem.refinement is not None or problem.noise_removed >= NEARLY_ALL
+    if noise.hidden.any():
+        steady = step.equations(denoised_matrix(problem.equations, noise.steady_power))
+    spreads = []
+    for scatters in [steady] if is_unbiased else [problem.solved, steady]:
+        response = WeightResponse(solution, scatters, unbiased, center)
+        painting = np.zeros_like(center) if painted is None else response.spread(painted[0]).inside
+        spreads.append((response.spread(covariance), painting))
+        del response  # of many lights it is large
+    of_interval, by_painting = spreads[-1]
+    if painted is not None:
+        by_painting = by_painting * t_ratios(painted[1])
+    return spreads[0], (of_interval, by_painting)
 
 
 def _where_lights_are_noise(
