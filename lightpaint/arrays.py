@@ -134,9 +134,38 @@ def copy_as_singles(
     for start in range(0, bits.size, _NUMBERS_AT_A_TIME):
         part = slice(start, start + _NUMBERS_AT_A_TIME)
         if are_finite or _are_finite(bits[part]):
-            _shift_to_singles(bits[part], flat[part])
+            _shift_to_singles(bits[part].view(np.int16), flat[part].view(np.int32), flat[part])
         else:
             np.take(_singles(), bits[part], out=flat[part], mode="clip")
+
+
+def copy_rows_as_singles(
+    rows: npt.NDArray[np.float16],
+    into: npt.NDArray[np.float32],
+    factors: npt.NDArray[np.float32],
+    *,
+    are_finite: bool,
+) -> None:
+    """Copy rows of half floats, (k, p), times factors, (k,), into an array of float32, (k, p).
+
+    factors: powers of two. Many rows at a time, since each call of NumPy takes as long as a
+    thousand numbers. Neither array need be contiguous. are_finite: as in `copy_as_singles`.
+    """
+    if not are_finite or not rows.dtype.isnative or _flushes_subnormals():
+        for row, one in zip(rows, into, strict=True):
+            copy_as_singles(row, one, are_finite=are_finite)
+        into *= factors[:, None]
+        return
+    bits, digits = rows.view(np.int16), into.view(np.int32)
+    # Beyond 1, the product of both might be too large.
+    both = np.minimum(factors, 1) * _RAISED_EXPONENT
+    is_larger = factors > 1
+    step = max(1, _NUMBERS_AT_A_TIME // max(rows.shape[1], 1))
+    for first in range(0, len(rows), step):
+        some = slice(first, first + step)
+        _shift_to_singles(bits[some], digits[some], into[some], both[some, None])
+        if is_larger[some].any():
+            into[some] *= np.maximum(factors[some, None], 1)
 
 
 def _are_finite(bits: npt.NDArray[np.uint16]) -> bool:
@@ -145,13 +174,20 @@ def _are_finite(bits: npt.NDArray[np.uint16]) -> bool:
     return bool(max(largest_positive, largest_negative) < _HALF_INFINITY)
 
 
-def _shift_to_singles(bits: npt.NDArray[np.uint16], into: npt.NDArray[np.float32]) -> None:
-    """Convert finite half floats, given as their bits, (n,), to float32, (n,)."""
-    digits = into.view(np.int32)
-    digits[...] = bits.view(np.int16)  # the sign is repeated to the left
+def _shift_to_singles(
+    bits: npt.NDArray[np.int16],
+    digits: npt.NDArray[np.int32],
+    into: npt.NDArray[np.float32],
+    factors: np.float32 | npt.NDArray[np.float32] = _RAISED_EXPONENT,
+) -> None:
+    """Convert finite half floats, given as their bits, to float32. digits: the bits of `into`.
+
+    factors: the ratio of the two scales of exponents, times what numbers are multiplied by.
+    """
+    digits[...] = bits  # the sign is repeated to the left
     digits <<= np.int32(13)
     digits &= _SIGN_AND_DIGITS
-    into *= _RAISED_EXPONENT
+    into *= factors
 
 
 def _flushes_subnormals() -> bool:

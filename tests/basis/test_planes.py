@@ -218,6 +218,12 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     monkeypatch.setattr(basis_file, "SPARSE_MIN_BYTES", sparse)
     monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
+    if largest:  # half of all pixels are lit, and there is room for all
+        whole = lp.read_basis(path)
+        assert isinstance(whole.planes, EncodedPlanes)
+        check_alike(whole.planes, basis.images)
+        check_alike(whole.noise, basis.half_differences)
+    monkeypatch.setattr(basis_file, "WHOLE_MAX_BYTES", 0)
     assert lp.read_basis(path).planes.lit_entries(slice(0, 9)) is None  # too many are lit
     monkeypatch.setattr(lit_planes, "MAX_LIT_SHARE", 1.0)
     reread = lp.read_basis(path)

@@ -87,6 +87,10 @@ IN_MEMORY_MAX_BYTES = 2**31
 #: The same for many lights, of which then only lit pixels are read into memory if these have room.
 SPARSE_MIN_BYTES = 2**29
 
+#: Maximum size in bytes of all pixels of images and noise in half floats, of many lights that light
+#: most of them.
+WHOLE_MAX_BYTES = 3 * 2**28
+
 #: Maximum size in bytes of a basis file that the library reads in less than two seconds.
 QUICK_MAX_BYTES = 2**29
 
@@ -348,11 +352,21 @@ def _read_large(path: Path) -> Basis | None:
     count, size = len(light_parts), light_parts[0].display if light_parts else (0, 0)
     stays_in_file = is_large(count, size)
     is_sparse = count >= MIN_LIGHTS and _float_bytes(count, size) > SPARSE_MIN_BYTES
-    if not (stays_in_file or is_sparse):
+    if not stays_in_file and not (is_sparse and not _is_mostly_lit(light_parts, size)):
         return None
     basis = _basis_of_rows(file, _head(p.texts for p in file.parts))
     has_room = basis is not None and isinstance(basis.planes, LitPlanes)
     return basis if stays_in_file or has_room else None
+
+
+def _is_mostly_lit(light_parts: Sequence[ExrPart | PartLayout], size: tuple[int, int]) -> bool:
+    """Return whether half floats of all pixels have room, and are walked along faster than lit
+    pixels alone, since these are many.
+    """
+    whole = len(light_parts) * size[0] * size[1]
+    lit = sum(part.size[0] * part.size[1] for part in light_parts)
+    # A lit pixel has its index beside its three channels.
+    return 12 * whole <= WHOLE_MAX_BYTES and 10 * lit >= 6 * whole / 2
 
 
 def _read_by_lights(path: Path) -> list[ExrPart] | None:
@@ -406,21 +420,31 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
         if LIGHT_KEY in p.attributes
     ]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
-    stored = cache(lambda k: planes_of_part(light_parts[k], scales_of(light_parts[k].attributes)))
+
+    def of_light(k: int) -> list[EncodedPlane | LitPlane]:
+        return planes_of_part(light_parts[k], scales_of(light_parts[k].attributes))
+
+    stored = cache(of_light)
+
+    @cache
+    def whole_sets(order: tuple[int, ...], size: tuple[int, int]) -> list[EncodedPlanes]:
+        lights = ([as_encoded_plane(x, size) for x in of_light(k)] for k in order)
+        return EncodedPlanes.sets(lights, len(order), size)
 
     def planes(order: Sequence[int], number: int) -> Planes:
         size = _common_size(light_parts)
-        of_lights = [stored(k)[number] for k in order]
-        is_direct = number < 2
         if not _is_encoded(len(order), size):
             singles = np.empty((len(order), *size, 3), np.float32)
-            for k, stored_plane in enumerate(of_lights):
+            for k, stored_plane in enumerate(stored(k)[number] for k in order):
                 singles[k] = as_encoded_plane(stored_plane, size).decoded()
             return as_planes(singles)
-        if len(order) >= MIN_LIGHTS and is_direct:
+        if len(order) >= MIN_LIGHTS and _is_mostly_lit(light_parts, size):
+            return whole_sets(tuple(order), size)[number]
+        of_lights = [stored(k)[number] for k in order]
+        if len(order) >= MIN_LIGHTS and number < 2:
             return LitPlanes([as_lit_plane(x) for x in of_lights], size)
         whole = [as_encoded_plane(x, size) for x in of_lights]
-        return EncodedPlanes(whole, is_decoded_once=is_direct)
+        return EncodedPlanes(whole, is_decoded_once=number < 2)
 
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]
     has_indirect = all(has_indirect_channels(p.channels) for p in light_parts)

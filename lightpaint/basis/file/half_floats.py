@@ -8,8 +8,8 @@ Values that are too bright for half floats, or so dim that they lose digits, are
 a power of two.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from threading import Lock
 from typing import Any
@@ -23,6 +23,7 @@ from lightpaint.arrays import (
     Floats,
     Indices,
     copy_as_singles,
+    copy_rows_as_singles,
     is_finite,
     read_only,
     release_freed_memory,
@@ -30,6 +31,7 @@ from lightpaint.arrays import (
 )
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 from lightpaint.images import grown
+from lightpaint.threads import parallel_map
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
@@ -42,7 +44,10 @@ HIDDEN_SHARE, TILE = 1 / 16, 8
 CLEAN, CLEAN_RADIUS = 1e-5, 2
 
 #: Maximum size in bytes of planes that are decoded once, in float32, rather than on each walk.
-DECODED_MAX_BYTES = 2**28
+DECODED_MAX_BYTES = 2**26
+
+#: Number of pixels of a light that are decoded and mixed at a time, in a processor's cache.
+MIXED_PIXELS = 2**15
 
 #: Number of pixels that are encoded at a time.
 STRIP_PIXELS = 2**16
@@ -113,15 +118,38 @@ class EncodedPlanes(RowPlanes):
     invisible.
 
     planes: one for each light. is_decoded_once: whether walks share what the first has decoded, if
-    that takes little memory; the stored numbers, which follow from it, are then forgotten.
+    that takes little memory; the stored numbers, which follow from it, are then forgotten. halves:
+    (n, 3, h, w), the array that has the numbers of all planes in half floats, if one has.
     """
 
-    def __init__(self, planes: Sequence[EncodedPlane], *, is_decoded_once: bool = True) -> None:
-        self._stored, self._is_decoded_once = list(planes), is_decoded_once
+    def __init__(
+        self,
+        planes: Sequence[EncodedPlane],
+        *,
+        is_decoded_once: bool = True,
+        halves: npt.NDArray[np.float16] | None = None,
+    ) -> None:
         self._count, self._size = len(planes), planes[0].size
+        singles_bytes = 12 * self._count * self._size[0] * self._size[1]
+        self._is_decoded_once = is_decoded_once and singles_bytes <= DECODED_MAX_BYTES
+        self._stored, self._halves = list(planes), halves
         self._lock = Lock()
         self._decoded: npt.NDArray[np.float32] | None = None
         self._mixes = KeptMixes()
+
+    @classmethod
+    def sets(
+        cls, lights: Iterable[Sequence[EncodedPlane]], count: int, size: tuple[int, int]
+    ) -> list["EncodedPlanes"]:
+        """Return sets of planes. lights: of each of `count` lights its planes, (height, width) =
+        `size`, which are copied one after the other.
+
+        Walks over indirect light, from the third set on, are rare, and need no copy in float32.
+        """
+        return [
+            cls(planes, is_decoded_once=k < 2, halves=halves)
+            for k, (planes, halves) in enumerate(_joined(lights, count, size))
+        ]
 
     @property
     def count(self) -> int:
@@ -176,16 +204,16 @@ class EncodedPlanes(RowPlanes):
         """All planes decoded, (n, 3, pixels), once for all walks; None if that takes much
         memory.
         """
-        pixels = self.size[0] * self.size[1]
-        if not self._is_decoded_once or 12 * self.count * pixels > DECODED_MAX_BYTES:
+        if not self._is_decoded_once:
             return None
+        pixels = self.size[0] * self.size[1]
         with self._lock:
             if self._decoded is None:
                 decoded = np.empty((self.count, 3, pixels), np.float32)
                 for i, channels in enumerate(decoded):
                     self._decode(i, slice(None), channels)
                     self._stored[i] = EncodedPlane(self._stored[i].encoding, ())
-                self._decoded = read_only(decoded)
+                self._decoded, self._halves = read_only(decoded), None
                 release_freed_memory()
             return self._decoded
 
@@ -203,13 +231,64 @@ class EncodedPlanes(RowPlanes):
         length = self._stored[0].numbers[0].reshape(-1)[where].size
         # Channels first, which is how they are stored and summed.
         block = np.empty((self.count, 3, length), np.float32)
-        for i, channels in enumerate(block):
-            self._decode(i, where, channels)
+        if self._halves is not None:
+            rows = self._halves.reshape(3 * self.count, -1)[:, where]
+            copy_rows_as_singles(
+                rows, block.reshape(len(rows), -1), self._factors, are_finite=self._are_finite
+            )
+        for i, (channels, plane) in enumerate(zip(block, self._stored, strict=True)):
+            if self._halves is None or plane.encoding.kind != HALF:
+                self._decode(i, where, channels)
         return block.transpose(0, 2, 1)
+
+    @cached_property
+    def _are_finite(self) -> bool:
+        """True if no half float of all planes is infinite or NaN."""
+        return all(x.is_finite for x in self._stored if x.encoding.kind == HALF)
+
+    @cached_property
+    def _factors(self) -> npt.NDArray[np.float32]:
+        """The scale of each channel of each plane, (3 n,)."""
+        return np.repeat(np.array([x.scale for x in self._stored], np.float32), 3)
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        if self._singles is not None:
+            return super().mixes(weights)
+        channels = self._mixed(np.asarray(weights, np.float32))
+        images = np.ascontiguousarray(channels.transpose(0, 2, 1))
+        return images.reshape(len(weights), *self.size, 3)
 
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only."""
-        return self._mixes.get(weights, super().exact_mix)
+        return self._mixes.get(weights, self._exact_mix)
+
+    def _exact_mix(self, weights: Doubles) -> Doubles:
+        if self._singles is not None:
+            return super().exact_mix(weights)
+        return self._mixed(np.asarray(weights, np.float64)[None])[0]
+
+    def _mixed(self, weights: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return several sums Σ w_i Φ_i, (k, 3, p), of the type of their weights, (k, n, 3).
+
+        Each light is decoded and added at once, so that no more than a few of its pixels need room.
+        """
+        pixels = self.size[0] * self.size[1]
+        mixed = np.zeros((len(weights), 3, pixels), weights.dtype)
+
+        def fill(start: int) -> None:
+            some = slice(start, min(start + MIXED_PIXELS, pixels))
+            light, share = (np.empty(some.stop - start, x) for x in (np.float32, weights.dtype))
+            for i, encoded in enumerate(self._stored):
+                factors = weights[:, i] * encoded.scale
+                for c in np.flatnonzero(factors.any(axis=0)):
+                    stored = encoded.numbers[c].reshape(-1)[some]
+                    copy_as_singles(stored, light, are_finite=encoded.is_finite)
+                    for into, factor in zip(mixed[:, c, some], factors[:, c], strict=True):
+                        into += np.multiply(light, factor, out=share)
+
+        parallel_map(fill, range(0, pixels, MIXED_PIXELS), unit="strips")
+        return mixed
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
         """Decode some pixels of light i into an array (3, p)."""
@@ -218,6 +297,26 @@ class EncodedPlanes(RowPlanes):
             copy_as_singles(stored.reshape(-1)[where], channel, are_finite=encoded.is_finite)
         if encoded.encoding.scale != 1:
             into *= np.float32(encoded.encoding.scale)
+
+
+def _joined(
+    lights: Iterable[Sequence[EncodedPlane]], count: int, size: tuple[int, int]
+) -> list[tuple[list[EncodedPlane], npt.NDArray[np.float16]]]:
+    """Return sets of planes, and for each the array (n, 3, h, w) with their half floats.
+
+    Where one array has the numbers of many planes, some pixels of all are decoded by few calls. It
+    has no pages where planes are in float32. lights, count, size: as in `EncodedPlanes.sets`.
+    """
+    sets: list[tuple[list[EncodedPlane], npt.NDArray[np.float16]]] = []
+    for i, planes in enumerate(lights):
+        sets = sets or [([], np.empty((count, 3, *size), HALF)) for _ in planes]
+        for plane, (encoded, halves) in zip(planes, sets, strict=True):
+            is_half = plane.encoding.kind == HALF
+            if is_half:
+                for channel, into in zip(plane.numbers, halves[i], strict=True):
+                    into[...] = channel
+            encoded.append(replace(plane, numbers=halves[i]) if is_half else plane)
+    return sets
 
 
 def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> EncodedPlane:
