@@ -68,12 +68,15 @@ class Peaks:
     ) -> None:
         """Add a block of some lights from `first` on: u, z and v, (lights, pixels) each."""
         lights = slice(first, first + len(could))
+        self.total[lights] += np.vecdot(could, could)
+        self.pushed[lights] += np.vecdot(push, push)
         u2 = np.square(could)
-        self.total[lights] += u2.sum(axis=1)
-        self.pushed[lights] += np.einsum("ip,ip->i", push, push)
         # Totals only grow: a pixel that is small by now stays small.
-        light, pixel = np.nonzero(u2 > PEAK_SHARE * self.total[lights, None])
+        least = PEAK_SHARE * self.total[lights]
+        some = np.flatnonzero(u2.max(axis=1, initial=0) > least)
+        light, pixel = np.nonzero(u2[some] > least[some, None])
         if light.size:
+            light = some[light]
             z2, v2 = (np.square(x[light, pixel]) for x in (push, shown))
             limit = most(light + first, pixel)
             self.candidates.append((light + first, u2[light, pixel], z2, v2, limit))

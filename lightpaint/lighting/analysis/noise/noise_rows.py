@@ -56,8 +56,12 @@ def mixed_with_beside(
     """
     if own_share == 1:
         return values
-    is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
-    return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
+    apart = beside - values
+    # Factors of 0 and 1 take a third of the time of `where`, whose branches nobody can foresee.
+    apart *= np.abs(apart) <= MAX_HALVES_APART * np.abs(halves)
+    apart *= 1 - own_share
+    apart += values
+    return np.asarray(apart)
 
 
 def values_beside(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -225,8 +229,8 @@ def dense_rows(
         row[...] = half * pixels.mean + factor(own_light, half, own) * pixels.half
         if sums is not None:
             weighed = pixels.D * own_light
-            sums.light[c, some] += weighed.sum(axis=1)
-            sums.light_squares[c, some] += np.einsum("ip,ip->i", weighed, weighed)
+            sums.light[c, some] += own_light @ pixels.D
+            sums.light_squares[c, some] += np.vecdot(weighed, weighed)
             size = pixels.missing + pixels.weights[some, None] * own_light
             shown = pixels.D * half * size
             sums.peaks[c].add(
@@ -253,10 +257,14 @@ def dense_rows(
 def _fourth_powers(rows: Doubles) -> Doubles:
     """Return the sum of fourth powers of each row, (n,).
 
-    Of light in physical units they may be beyond the range of float32.
+    Of light in physical units they may be beyond the range of float32: squares are divided by the
+    largest of their row before.
     """
     squares = np.square(rows)
-    return np.asarray(np.einsum("ip,ip->i", squares, squares, dtype=np.float64))
+    largest = squares.max(axis=1, initial=0)
+    largest[largest == 0] = 1
+    squares /= largest[:, None]
+    return np.vecdot(squares, squares) * np.square(largest, dtype=np.float64)
 
 
 @dataclass(frozen=True)
