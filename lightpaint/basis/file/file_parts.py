@@ -343,8 +343,7 @@ def as_encoded_plane(plane: EncodedPlane | LitPlane, size: tuple[int, int]) -> E
     """Return a plane with all its pixels."""
     if isinstance(plane, EncodedPlane):
         return plane
-    numbers = np.zeros((3, size[0] * size[1]), plane.numbers.dtype)
-    numbers[:, plane.pixels] = plane.numbers
+    numbers = plane.at_its_pixels(size[0] * size[1])
     encoding = PlaneEncoding(plane.numbers.dtype, plane.scale)
     return EncodedPlane(encoding, numbers.reshape(3, *size))
 

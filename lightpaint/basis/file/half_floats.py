@@ -266,7 +266,7 @@ class EncodedPlanes(RowPlanes):
     def _exact_mix(self, weights: Doubles) -> Doubles:
         if self._singles is not None:
             return super().exact_mix(weights)
-        return self._mixed(np.asarray(weights, np.float64)[None])[0]
+        return np.asarray(self._mixed(np.asarray(weights, np.float64)[None])[0])
 
     def _mixed(self, weights: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return several sums Σ w_i Φ_i, (k, 3, p), of the type of their weights, (k, n, 3).
@@ -281,7 +281,7 @@ class EncodedPlanes(RowPlanes):
             light, share = (np.empty(some.stop - start, x) for x in (np.float32, weights.dtype))
             for i, encoded in enumerate(self._stored):
                 factors = weights[:, i] * encoded.scale
-                for c in np.flatnonzero(factors.any(axis=0)):
+                for c in np.flatnonzero(factors.any(axis=0)).tolist():
                     stored = encoded.numbers[c].reshape(-1)[some]
                     copy_as_singles(stored, light, are_finite=encoded.is_finite)
                     for into, factor in zip(mixed[:, c, some], factors[:, c], strict=True):

@@ -98,8 +98,14 @@ class LitPlane:
 
     def dense(self, pixels: int) -> npt.NDArray[np.float32]:
         """Return all pixels, (3, pixels), not yet multiplied by the scale."""
-        plane = np.zeros((3, pixels), np.float32)
-        plane[:, self.pixels] = self.numbers
+        return self.in_kind(np.float32).at_its_pixels(pixels)
+
+    def at_its_pixels(self, pixels: int) -> npt.NDArray[Any]:
+        """Return the numbers of all pixels, (3, pixels), as stored."""
+        plane, lit = np.zeros((3, pixels), self.numbers.dtype), self.pixels.astype(np.intp)
+        # A third of the time that all three channels take at once.
+        for into, channel in zip(plane, self.numbers, strict=True):
+            into[lit] = channel
         return plane
 
 

@@ -264,7 +264,7 @@ def _fourth_powers(rows: Doubles) -> Doubles:
     largest = squares.max(axis=1, initial=0)
     largest[largest == 0] = 1
     squares /= largest[:, None]
-    return np.vecdot(squares, squares) * np.square(largest, dtype=np.float64)
+    return np.asarray(np.vecdot(squares, squares) * np.square(largest, dtype=np.float64))
 
 
 @dataclass(frozen=True)
