@@ -82,12 +82,24 @@ def box_mean(values: Floats, radius: int) -> Floats:
     """Return means over a square window, which is clipped at the borders. values: (h, w, …)."""
     for axis in (0, 1):
         length = values.shape[axis]
-        total = np.cumsum(values, axis=axis, dtype=np.float64)
-        total = np.concatenate([np.zeros_like(np.take(total, [0], axis)), total], axis)
-        low = np.maximum(np.arange(length) - radius, 0)
-        high = np.minimum(np.arange(length) + radius + 1, length)
-        count = (high - low).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
-        values = (np.take(total, high, axis) - np.take(total, low, axis)) / count
+        # Running sums, with 0 before them and the last one repeated after them.
+        shape = (*values.shape[:axis], length + 2 * radius + 1, *values.shape[axis + 1 :])
+        sums = np.zeros(shape)
+        inside, after, low, high = (
+            (*[slice(None)] * axis, part)
+            for part in (
+                slice(radius + 1, radius + 1 + length),
+                slice(radius + 1 + length, None),
+                slice(length),
+                slice(2 * radius + 1, None),
+            )
+        )
+        np.cumsum(values, axis=axis, out=sums[inside])
+        sums[after] = np.take(sums, [radius + length], axis)
+        places = np.arange(length)
+        count = np.minimum(places + radius + 1, length) - np.maximum(places - radius, 0)
+        values = sums[high] - sums[low]
+        values /= count.reshape([-1 if k == axis else 1 for k in range(values.ndim)])
     return values
 
 
