@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.arrays import as_singles, copy_as_singles, round_to_halves
+from lightpaint.arrays import (
+    as_singles,
+    copy_as_singles,
+    copy_rows_as_singles,
+    round_to_halves,
+)
 from lightpaint.basis.file import basis_file, half_floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file.file_parts import SCALE_KEY
@@ -84,6 +89,26 @@ def test_half_floats_are_converted_with_the_bits_of_numpy(
         columns = np.empty((halves.size, 3), np.float32)
         copy_as_singles(halves, columns[:, 1])
         np.testing.assert_array_equal(columns[:, 1].view(np.uint32), expected)
+
+
+@pytest.mark.parametrize("flushes", [False, True])
+def test_rows_of_half_floats_are_scaled_by_powers_of_two(
+    flushes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exactly: from parts of rows to parts of others, whose product with both scales is finite."""
+    monkeypatch.setattr("lightpaint.arrays._flushes_subnormals", lambda: flushes)
+    every = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    finite = every[np.isfinite(every)]
+    factors = np.array([1, 2.0**-100, 2.0**-20, 2.0**30, 2.0**100], np.float32)
+    for halves in (every, finite, finite[:7], finite[:0]):
+        rows = np.stack([halves[::-1], *(halves,) * 4])
+        room = np.zeros((5, halves.size + 3), np.float32)
+        with np.errstate(invalid="ignore"):  # signalling NaN
+            expected = rows.astype(np.float32) * factors[:, None]
+            are_finite = halves is not every
+            copy_rows_as_singles(rows, room[:, 1:-2], factors, are_finite=are_finite)
+        np.testing.assert_array_equal(room[:, 1:-2], expected)
+        assert not room[:, [0, -2, -1]].any()
 
 
 def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:

@@ -20,7 +20,7 @@ import lightpaint
 import lightpaint as lp
 from lightpaint.basis import planes as planes_module
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
-from lightpaint.basis.file import basis_file, file_planes, lit_planes
+from lightpaint.basis.file import basis_file, file_planes, half_floats, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
@@ -219,6 +219,8 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
     if largest:  # half of all pixels are lit, and there is room for all
+        monkeypatch.setattr(half_floats, "DECODED_MAX_BYTES", room)
+        monkeypatch.setattr(half_floats, "MIXED_PIXELS", 1000)
         whole = lp.read_basis(path)
         assert isinstance(whole.planes, EncodedPlanes)
         check_alike(whole.planes, basis.images)
