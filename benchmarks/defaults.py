@@ -12,8 +12,8 @@ version.
 - second: `lightpaint solve` of each painting of the gallery with the basis kept that the demo
   rendered, verification included; and how much of the light the verification checked: the share of
   lights in which it would probably have seen an error of 5 %.
-- first: a first picture with nothing kept and no kernel compiled: the fewest samples whose current
-  look, denoised, has a mean ΔE of 3 or less to a long render.
+- first: a painter with nothing kept and no kernel compiled, until a page has its first picture, the
+  least of `--repeats`; and the mean ΔE of that picture to a long render.
 - weights: the mean relative error of the lights' weights, each with its share of the picture, by
   the samples that the version's demo takes, and the mean ΔE of the denoised prediction to the long
   render at the same weights. On a quarter of the film, several seeds, solved as `lightpaint solve`
@@ -30,6 +30,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.request import Request, urlopen
 
 import numpy as np
 
@@ -48,9 +49,6 @@ PARTS = ("demo", "again", "unverified", "second", "first", "weights")
 #: Parts that use what the demo leaves.
 AFTER_DEMO = ("again", "unverified", "second")
 
-#: Most mean ΔE of a first picture.
-CLOSE = 3.0
-
 #: Chance from which on an error would probably have been seen.
 LIKELY = 0.5
 
@@ -64,22 +62,6 @@ code = subprocess.run([sys.executable, *sys.argv[1:]], stdout=sys.stderr).return
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
 print(used.ru_utime + used.ru_stime)
 sys.exit(code)
-"""
-
-#: One picture of the scene as it is, denoised, written as NumPy's array.
-FIRST = """
-import sys
-import numpy as np
-import lightpaint as lp
-from lightpaint.images.denoiser import denoised
-scene, spp, out = sys.argv[1:]
-basis = lp.render_basis(lp.load_scene(scene), spp=int(spp))
-try:
-    from lightpaint.basis.denoised_mixes import denoise_current_look
-    picture = denoise_current_look(basis)
-except ImportError:  # an earlier version
-    picture = denoised(basis.current_look, basis.features)
-np.save(out, picture)
 """
 
 #: Weights for each painting, of a long render and of several seeds, as `lightpaint solve` finds
@@ -143,19 +125,16 @@ def main() -> None:
         if "second" in options.parts:
             second(checkouts, place)
         if "first" in options.parts:
-            first(checkouts, place, options.long_spp)
+            first(checkouts, place, options.long_spp, options.repeats)
         if "weights" in options.parts:
             weights(checkouts, place, options.long_spp, options.seeds)
 
 
 def seconds_of(arguments: Sequence[str], checkout: Path, home: Path) -> float:
     """Run Python with `arguments` in a version; return the processor's seconds."""
-    home.mkdir(exist_ok=True)
-    (home / "cache").mkdir(exist_ok=True)
-    environment = {"HOME": str(home), "LIGHTPAINT_CACHE": str(home / "cache")}
     completed = subprocess.run(
         [sys.executable, "-c", TIMED, *arguments],
-        env={**os.environ, "PYTHONPATH": str(checkout), **environment},
+        env=environment_of(checkout, home),
         capture_output=True,
         cwd=home,
         text=True,
@@ -164,6 +143,15 @@ def seconds_of(arguments: Sequence[str], checkout: Path, home: Path) -> float:
     if completed.returncode:
         raise SystemExit(completed.stderr)
     return float(completed.stdout)
+
+
+def environment_of(checkout: Path, home: Path) -> dict[str, str]:
+    """Return the environment of a version whose files and cache are in `home`."""
+    (home / "cache").mkdir(parents=True, exist_ok=True)
+    # Installed packages have their bytecode, and a source tree may not.
+    own = {"HOME": str(home), "LIGHTPAINT_CACHE": str(home / "cache"), "PYTHONPATH": str(checkout)}
+    own["PYTHONPYCACHEPREFIX"] = str(home.parent / "py")
+    return {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"} | own
 
 
 def command(*arguments: str) -> list[str]:
@@ -240,28 +228,74 @@ def second(checkouts: dict[str, Path], place: Path) -> None:
     print_row("second painting, all six", total)
 
 
-def first(checkouts: dict[str, Path], place: Path, long_spp: int) -> None:
-    """Measure how long a first picture takes that is close to a long render."""
+def first(checkouts: dict[str, Path], place: Path, long_spp: int, repeats: int) -> None:
+    """Measure how long a painter's first picture takes, and how far it is from a long render."""
     import lightpaint as lp
 
-    scene = str(ROOT / GALLERY)
     # A picture of ordinary paths, so that it is nobody's own.
     truth = lp.render_basis(
-        lp.load_scene(scene).reduced("1/2"), spp=long_spp // 4, seed=LONG_SEED
+        lp.load_scene(str(ROOT / GALLERY)).reduced("1/2"), spp=long_spp // 4, seed=LONG_SEED
     ).current_look
-    durations, notes = {}, []
-    for version, checkout in checkouts.items():
-        for spp in (2, 4, 8, 16, 32, 64):
-            output = place / f"{version}-{spp}.npy"
-            home = place / f"first-{version}-{spp}"
-            durations[version] = seconds_of(
-                ["-c", FIRST, scene, str(spp), str(output)], checkout, home
-            )
-            error = delta_e_mean(np.load(output), truth)
-            if error <= CLOSE:
-                break
-        notes.append(f"{spp} samples, ΔE {error:.1f}")
-    print_row("first picture, cold", durations, " / ".join(notes))
+    pictures: dict[str, Any] = {}
+
+    def run(version: str) -> float:
+        with tempfile.TemporaryDirectory(dir=place) as home:
+            seconds, pictures[version] = first_picture(checkouts[version], Path(home))
+        return seconds
+
+    durations = least_in_turns(run, checkouts, repeats)
+    note = " / ".join(f"ΔE {delta_e_mean(pictures[x], truth):.1f}" for x in checkouts)
+    print_row("first picture, cold", durations, note)
+
+
+def first_picture(checkout: Path, home: Path) -> tuple[float, Any]:
+    """Return the processor's seconds of a painter until a page has its first picture, and that."""
+    options = ["-o", "painted", "--no-browser", "--port", "0"]
+    painter = subprocess.Popen(
+        [sys.executable, *command("paint", str(checkout / GALLERY), *options)],
+        env=environment_of(checkout, home),
+        cwd=home,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        assert painter.stdout is not None
+        next(line for line in painter.stdout if line.startswith("painting "))
+        about = json.loads((home / "painted" / "painter.json").read_text())
+        picture = picture_of(about, wait_for_state(about))
+        times = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()
+        return sum(map(int, times[11:15])) / os.sysconf("SC_CLK_TCK"), picture
+    finally:
+        painter.terminate()
+        painter.wait()
+
+
+def wait_for_state(about: dict[str, Any]) -> dict[str, Any]:
+    """Return the first state that a painter sends to a page. about: its connection file."""
+    from websockets.sync.client import connect
+
+    from lightpaint.paint.message_frames import from_frame, to_frame
+
+    address = about["address"].replace("http", "ws", 1) + "live"
+    with connect(address, additional_headers=key_of(about), max_size=None) as page:
+        page.send(to_frame({"kind": "hello", "seq": 1, "version": about["protocol"]}, []))
+        while True:
+            content, _ = from_frame(page.recv())
+            if content["kind"] == "state":
+                return content
+
+
+def picture_of(about: dict[str, Any], state: dict[str, Any]) -> Any:
+    """Return the current look of a painter, (h, w, 3) linear."""
+    with urlopen(Request(f"{about['address']}data/present", headers=key_of(about))) as answer:
+        halves = np.frombuffer(answer.read(), np.float16)
+    return halves.reshape(*state["size"], 3).astype(np.float32)
+
+
+def key_of(about: dict[str, Any]) -> dict[str, str]:
+    """Return the header that lets a program connect."""
+    return {"Authorization": f"Bearer {about['token']}"}
 
 
 def weights(checkouts: dict[str, Path], place: Path, long_spp: int, seeds: int) -> None:

@@ -410,8 +410,9 @@ STAGES = {
     "page": f"() => {PAINTER}",
     "picture": f"() => {PAINTER}?.engine.mirror.isReady"
     " && document.querySelector('.lightpaint .tag') && document.querySelector('.is-lights input')",
-    "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.mirror;"
-    " return !loader.missingSlots().length && !loader.activeFetches.size; }",
+    "planes": f"() => {{ const {{ loader, state }} = {PAINTER}.engine.mirror;"
+    " const areThere = state.basis.spp > 0 || state.basis.is_complete;"
+    " return areThere && !loader.missingSlots().length && !loader.activeFetches.size; }",
 }
 
 
