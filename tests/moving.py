@@ -46,7 +46,10 @@ class MovingStudio:
         )
         self.studio.on_message = self.messages.append
         self.studio.start()
-        self.wait(lambda: any(m.kind == "state" for m in self.messages))
+        self.wait(lambda: self.studio.is_ready)
+        self.wait(
+            lambda: any(m.kind == "state" and m.fields["basis"]["spp"] for m in self.messages)
+        )
 
     def wait(self, condition: Callable[[], Any], seconds: float = PATIENCE_S) -> Any:
         deadline = time.monotonic() + seconds

@@ -29,6 +29,9 @@ MAX_SAMPLES = 2**40
 #: light that holds what these lack of the whole picture.
 LIGHT_GROUPS, REST = "light groups of ", "rest"
 
+#: Method of a basis that is a picture of the scene alone, until its lights are rendered.
+PLAIN_LOOK = "plain look"
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -97,6 +100,11 @@ class Origin:
     def is_light_groups(self) -> bool:
         """True if another renderer made the picture, which then has no template."""
         return self.method.startswith(LIGHT_GROUPS)
+
+    @property
+    def is_plain_look(self) -> bool:
+        """True if the planes only sum to a picture of the scene: no light is known yet."""
+        return self.method == PLAIN_LOOK
 
 
 @keywords()
@@ -485,7 +493,7 @@ def meter_exposure(image: Floats, *bases: Basis) -> float:
     image: (h, w, 3) linear; for several bases, their pixels in one row, (1, p, 3). Visible emitters
     are ignored, except in light groups, which do not say where they are.
     """
-    if not all(basis.knows_noise for basis in bases):
+    if not all(basis.knows_noise or basis.origin.is_plain_look for basis in bases):
         return choose_exposure(image)
     is_emitter = [basis.emitters_seen.ravel() for basis in bases]
     return choose_exposure(image, np.concatenate(is_emitter).reshape(image.shape[:2]))

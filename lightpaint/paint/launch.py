@@ -110,7 +110,7 @@ def _serve_session(
         finally:
             server.close()
             connection_file.remove()
-        if studio.failure is not None and studio.store is None:
+        if studio.failure is not None and not studio.is_ready:
             raise studio.failure
     finally:
         _close(studio, session_file)

@@ -48,6 +48,18 @@ class SessionAccess:
         return self.current
 
     @property
+    def is_ready(self) -> bool:
+        """True once the session has its lights, and not only a picture of the scene."""
+        return self.current is not None and not self.current.is_waiting
+
+    @property
+    def ready_session(self) -> Session:
+        """The session, whose lights are rendered. Raises PaintError before they are."""
+        if not self.is_ready:
+            raise self._absence
+        return self.session
+
+    @property
     def looks(self) -> LookLibrary:
         """The looks of the session. Raises PaintError before there is a basis."""
         if self._looks is None:
@@ -56,7 +68,8 @@ class SessionAccess:
 
     @property
     def _absence(self) -> PaintError:
-        return PaintError(self.failure_text or "the first picture is still being rendered")
+        missing = "first picture is" if self.current is None else "lights are"
+        return PaintError(self.failure_text or f"the {missing} still being rendered")
 
     @property
     def store(self) -> Store | None:
@@ -71,7 +84,7 @@ class SessionAccess:
     def snapshot(self) -> SessionSnapshot:
         """Return the current paintings and requests. Raises PaintError before there is a basis."""
         with self.lock:
-            return self.session.snapshot()
+            return self.ready_session.snapshot()
 
     def layers(self) -> tuple[ViewLayers, ...]:
         """Return the current layers of each view. Raises PaintError before there is a basis."""
@@ -89,7 +102,7 @@ class SessionAccess:
     def snapshot_at_rest(self) -> SessionSnapshot | None:
         """Return the snapshot; None before there is a basis and while a stroke is open."""
         with self.lock:
-            is_at_rest = self.current is not None and not self.current.is_open
+            is_at_rest = self.is_ready and not self.session.is_open
             return self.session.snapshot() if is_at_rest else None
 
     def snapshot_and_lighting(
@@ -100,7 +113,7 @@ class SessionAccess:
         requests: replace the requests of the session, if given.
         """
         with self.lock:
-            snapshot = self.session.snapshot(requests)
+            snapshot = self.ready_session.snapshot(requests)
             weights = self.session.weights
         return snapshot, snapshot.lighting_of(weights)
 

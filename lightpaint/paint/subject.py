@@ -205,7 +205,9 @@ class Subject:
             read_layers(self.layers, self.size, ViewTransform("srgb"))
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
-        """Yield its basis; one that is still to be rendered follows previews of few samples."""
+        """Yield its basis; one that is still to be rendered follows a picture of the scene as it
+        is, whose lights are unknown (`Origin.is_plain_look`), and previews of few samples.
+        """
         if self.basis is not None:
             yield self.basis
             return
@@ -225,6 +227,8 @@ class Subject:
             return
         of_scene = scene.identity, sensor_name(scene), settings.seed, scene.size
         done_spp = basis_cache.cached_spp(*of_scene) if settings.use_cache else 0
+        if settings.time_s is None and not done_spp:
+            yield self._plain_look(progress)
         if settings.use_cache and settings.time_s is None:
             for spp in PREVIEW_SPP:
                 if done_spp < spp < target_spp:
@@ -270,6 +274,17 @@ class Subject:
         if cached.features is None or cached.objects is None:  # an earlier version wrote it
             return None
         return replace(cached, lights=lights)
+
+    def _plain_look(self, progress: Progress) -> Basis:
+        """Return a picture of the scene as it is, which is there before its lights are."""
+        from lightpaint.basis.render import render_plain_look
+
+        def report() -> None:
+            progress("basis", 0, self.target_spp or 1, "samples per pixel")
+
+        report()
+        scene, seed = self.loaded_scene, self.settings.seed
+        return render_plain_look(scene, seed=seed, between=report)
 
     def _obtain_at(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.cache import obtain_basis

@@ -42,6 +42,7 @@ class Stream(IntEnum):
     SURFACES = 7
     CANDIDATES = 8
     FROZEN_PATHS = 9
+    PLAIN_LOOK = 10
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:

@@ -84,7 +84,8 @@ def keep_basis(
 def test_previews_of_more_and_more_samples_come_to_the_bits_of_one_render(path: Path) -> None:
     solved = obtain(lp.load_scene(path), Settings(spp=48, use_cache=False), silent)
     bases = list(open_subject(path, spp=48).bases())
-    assert [basis.origin.spp for basis in bases] == [2, 8, 32, 48]
+    assert [basis.origin.spp for basis in bases] == [0, 2, 8, 32, 48]
+    assert [basis.origin.is_plain_look for basis in bases] == [True, *[False] * 4]
     assert_equal_bits(bases[-1], solved)
     [final_basis] = open_subject(path, spp=48).bases()
     assert_equal_bits(final_basis, solved)

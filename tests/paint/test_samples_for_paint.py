@@ -57,7 +57,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
     studio.on_message = messages.append
     studio.start()
     try:
-        wait_until(lambda: studio.store is not None)
+        wait_until(lambda: studio.is_ready)
         paint(studio, 1, (0.5, 0.3, 0.2))
 
         def is_sure() -> bool:
@@ -104,7 +104,7 @@ def test_planes_with_added_samples_are_denoised_anew(
     studio = Studio([subject], MemoryStore)
     studio.start()
     try:
-        wait_until(lambda: studio.store is not None)
+        wait_until(lambda: studio.is_ready)
         paint(studio, 1, (0.5, 0.3, 0.2))
 
         def is_done() -> bool:
@@ -127,7 +127,7 @@ def test_a_round_gives_way_to_the_brush(subject: Subject):
     studio = Studio([subject], MemoryStore)
     studio.start()
     try:
-        wait_until(lambda: studio.store is not None)
+        wait_until(lambda: studio.is_ready)
         paint(studio, 1, (0.5, 0.3, 0.2))
         snapshot = studio.snapshot()
         solution = snapshot.solution()

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         check_renders_spectra, remark_on_fog, remark_on_separate_renders, why_not_one_pass,
     )
     from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
+    from lightpaint.basis.render.plain_look import render_plain_look
     from lightpaint.basis.render.render_budget import check_samples
     from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
     from lightpaint.basis.render.rendered_basis import (

@@ -178,9 +178,9 @@ class SessionTraits:
                 self._apply(arguments)
 
     def assign_when_ready(self, name: str, value: Any) -> None:
-        """Set a trait now, or once the first basis is there. Raises LightpaintError if now."""
+        """Set a trait now, or once its lights are rendered. Raises LightpaintError if now."""
         with self._lock:
-            if self._studio.store is None:
+            if not self._studio.is_ready:
                 self._pending.append((name, value))
             else:
                 setattr(self._owner, name, value)
@@ -515,7 +515,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             with self._lock:
                 self._views.send(message)
                 is_exact = isinstance(message, AnswerUpdate) and message.exact
-                if is_exact or isinstance(message, SessionState):
+                has_lights = isinstance(message, SessionState) and self._studio.is_ready
+                if is_exact or has_lights:
                     self._session_traits.update()
                     self._output.follow()
 

@@ -131,6 +131,11 @@ class Session:
         return self._moved_lights.bases_at(placed)
 
     @property
+    def is_waiting(self) -> bool:
+        """True while the lights of a view are not rendered: paint is kept, and answered then."""
+        return any(basis.origin.is_plain_look for basis in self.bases)
+
+    @property
     def requests(self) -> SessionRequests:
         """Requests in effect."""
         return self.live_answer.requests
@@ -250,6 +255,8 @@ class Session:
     @property
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
+        if self.is_waiting:
+            return protocol.Findings(headline=session_messages.WAITING_HEADLINE)
         answer, bases = self.live_answer, [view.basis for view in self.views]
         findings = session_messages.answer_findings(
             bases, self.weights, answer.lamps, answer.mixed_emissions
@@ -558,7 +565,8 @@ class Session:
         self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
         self._follow_start()
         is_slider = self.live_answer.before_slider is not None
-        self.live_answer.solve(while_painting=self.views.is_open and not is_slider)
+        if not self.is_waiting:
+            self.live_answer.solve(while_painting=self.views.is_open and not is_slider)
         if not self.is_open and self._answered_step != self.store.last_id:
             self._keep_answer()
 

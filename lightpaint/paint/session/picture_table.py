@@ -216,11 +216,12 @@ def page_emitters(basis: Basis) -> Bools:
 
 
 def plane_scale(basis: Basis, k: int) -> float:
-    """Return the divisor of light k's plane for sending; 1 for lights that were added.
+    """Return the divisor of light k's plane for sending; 1 for lights that were added, and while
+    none has a plane.
 
     basis: as in `page_factor`. The scales of all its lights take a walk over the planes, once.
     """
-    if k >= len(basis.lights):
+    if k >= len(basis.lights) or basis.origin.is_plain_look:
         return 1.0
     return float(array_once(basis.planes, "scales", lambda: _scales(basis))[k])
 

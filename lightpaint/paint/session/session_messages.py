@@ -51,6 +51,9 @@ MAX_RENDERED_LAMPS = 32
 #: Phrase for an answer that is farther from the paint.
 WORSE_TEXT = "Farther from the paint than the current lighting, which undo brings back"
 
+#: Headline while the lights are not rendered yet.
+WAITING_HEADLINE = "The lights are being rendered: what you paint is kept, and answered then"
+
 #: Kinds of advice on what limits the answer; a page has a button for each.
 ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more or loosen the hold.",

@@ -60,8 +60,28 @@ def offer_view(
 
     basis: of the view, with every light at its place in the scene. clean: of the size that the page
     has. small: planes of pixel blocks, which improve the rough ones. Planes of very many lights are
-    offered as they were rendered until they are denoised.
+    offered as they were rendered until they are denoised, and none before lights are rendered.
     """
+    offer_ground(table, view, transform)
+    _offer_painting(table, view)
+    if not basis.origin.is_plain_look:
+        _offer_lights(table, view, basis, clean, small)
+
+
+def _offer_painting(table: PictureTable, view: Canvas) -> None:
+    """Offer what is painted in a view."""
+    table.offer(name_in_view("painting", view.view), lambda: view.image.copy())
+    table.offer(name_in_view("importance", view.view), lambda: view.importance.copy())
+
+
+def _offer_lights(
+    table: PictureTable,
+    view: Canvas,
+    basis: Basis,
+    clean: DenoisedPlanes | None,
+    small: DenoisedPlanes | None,
+) -> None:
+    """Offer the lights of a view, and the surfaces and objects that it sees, as `offer_view`."""
 
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
@@ -82,9 +102,6 @@ def offer_view(
             table.withdraw(name)
             name = name_in_view(f"plane/{k}", view.view)
         offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
-    offer_ground(table, view, transform)
-    offer("painting", lambda: view.image.copy())
-    offer("importance", lambda: view.importance.copy())
     if basis.features is not None:
         albedo = basis.features.albedo
         offer("albedo", lambda: as_halves(albedo))
@@ -261,13 +278,14 @@ def state_fields(
         "looks": looks.infos(),
         "presets": tuple(
             protocol.PresetInfo(x.name, x.title, x.description, x.has_subject)
-            for x in PRESETS.values()
+            for x in (() if session.is_waiting else PRESETS.values())
         ),
         "references": tuple(protocol.ReferenceInfo(x.id, x.name) for x in session.references),
         "basis": protocol.SampleCount(
             spp=basis.origin.spp,
             target_spp=target_spp or basis.origin.spp,
-            is_complete=target_spp is None or basis.origin.spp >= target_spp,
+            is_complete=not session.is_waiting
+            and (target_spp is None or basis.origin.spp >= target_spp),
         ),
         "planes": None if (planes := session.live_answer.planes) is None else planes.info,
         "reading": session.live_answer.planes_reading(),

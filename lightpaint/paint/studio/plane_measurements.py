@@ -67,9 +67,9 @@ class PlaneMeasurements:
         if not self.is_wanted:
             return
         with self._access.lock:
-            session = self._access.current
-            if session is None or session.is_open:
+            if not self._access.is_ready or self._access.session.is_open:
                 return
+            session = self._access.session
             requests = session.requests
             if requests.place_key == self._place_key:
                 return

@@ -83,7 +83,8 @@ class PlaneDenoiser:
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
             # Planes of many lights are looked for while the page can be used already.
-            is_looked_for = self._use_cache and not picture_table.opens_plain(basis)
+            has_files = self._use_cache and not basis.origin.is_plain_look
+            is_looked_for = has_files and not picture_table.opens_plain(basis)
             cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
                 current_looks.append(_clean_look(basis))
@@ -126,7 +127,8 @@ class PlaneDenoiser:
         for view, basis in zip(session.views, session.bases, strict=True):
             planes_of_view = self._by_view.get(view.view)
             is_missing = planes_of_view is None or not planes_of_view.matches(basis)
-            if is_missing and not picture_table.has_mixes(basis):
+            has_planes = not (basis.origin.is_plain_look or picture_table.has_mixes(basis))
+            if is_missing and has_planes:
                 self._denoise_view(session, view, basis)
 
     def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
@@ -165,6 +167,8 @@ class PlaneDenoiser:
 
 def _clean_look(basis: Basis) -> Floats:
     """Return the denoised current look, (h, w, 3)."""
+    if basis.origin.is_plain_look:
+        return basis.current_look
     if not picture_table.opens_plain(basis) or basis.former is not None:
         return denoise_current_look(basis)
     denoiser = "".join(denoiser_text(basis.features, raw="").values())
@@ -200,6 +204,7 @@ class SessionBases:
         self._subjects, self._open_store = subjects, open_store
         self._denoiser, self._mover = denoiser, mover
         self._on_new_bases, self._warn = on_new_bases, warn
+        self._waiting_store: Store | None = None  # of the session, until it is open
 
     def obtain(self) -> None:
         """Continue the session with bases of more and more samples, and denoise each.
@@ -208,11 +213,27 @@ class SessionBases:
         """
         with MITSUBA.low_priority():
             for bases in obtain_bases(self._subjects, self._publisher.report_progress):
+                if self._is_too_early(bases):
+                    continue
                 self.use(bases)
                 self._keep_openings(bases)
                 self._denoiser.denoise(self._access.session)
         self._publisher.publish(ProgressReport(task="basis", done=1, total=1, unit=""))
         self._denoiser.write_cache()
+
+    def _is_too_early(self, bases: Sequence[Basis]) -> bool:
+        """Return whether lights are unknown, of a session that does not begin with these bases: its
+        lights may hang elsewhere, or start from another lighting.
+        """
+        if not any(basis.origin.is_plain_look for basis in bases) or self._access.current:
+            return False
+        self._waiting_store = self._open_store(Identity.of(bases))
+        return bool(self._waiting_store.steps) or self._subjects[0].layers is not None
+
+    def close(self) -> None:
+        """Close a store whose session was not opened."""
+        if self._waiting_store is not None:
+            self._waiting_store.close()
 
     def use(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases, or open it with them.
@@ -241,7 +262,8 @@ class SessionBases:
     def _keep_openings(self, bases: Sequence[Basis]) -> None:
         """Keep the results of walks over all planes with which sessions of these bases begin."""
         for subject, basis in zip(self._subjects, bases, strict=True):
-            if subject.settings.use_cache and picture_table.opens_plain(basis):
+            is_rendered = not basis.origin.is_plain_look
+            if subject.settings.use_cache and is_rendered and picture_table.opens_plain(basis):
                 picture_table.plane_scale(basis, 0)  # of all planes, for the pages
                 keep_opening(basis)
 
@@ -250,7 +272,8 @@ class SessionBases:
     ) -> tuple[Session, LookLibrary]:
         """Return the session of the first bases, and its looks. Raises LightpaintError."""
         first = self._subjects[0]
-        store = self._open_store(Identity.of(bases))
+        store = self._waiting_store or self._open_store(Identity.of(bases))
+        self._waiting_store = None
         try:
             session = Session(
                 bases,
@@ -285,8 +308,9 @@ class SessionBases:
             session_state.offer_view(pictures, view, basis, session.transform, clean, small)
         session_state.offer_transforms(pictures, session_state.offered_transforms(session))
         session_state.offer_layers(pictures, session.views)
-        session_state.offer_lights_at(pictures, session.views)
-        session_state.offer_presets(pictures, session.views[0], session.transform)
+        if not session.is_waiting:
+            session_state.offer_lights_at(pictures, session.views)
+            session_state.offer_presets(pictures, session.views[0], session.transform)
         session_state.offer_references(pictures, session.references)
         session_state.offer_steps(pictures, session.history.picture)
         self._mover.offer_all(session)

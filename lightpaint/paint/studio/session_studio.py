@@ -52,6 +52,29 @@ from lightpaint.paint.studio.session_exports import FinalRenders
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
 
+#: Requests that need no lights: a session whose lights are not rendered yet keeps them, and
+#: answers then.
+KEPT_REQUESTS = (
+    protocol.Paint
+    | protocol.ChangeLayers
+    | protocol.Select
+    | protocol.DropStroke
+    | protocol.Undo
+    | protocol.Redo
+    | protocol.GoToStep
+    | protocol.ListSteps
+    | protocol.ClearPainting
+    | protocol.StartOver
+    | protocol.ConstrainLight
+    | protocol.ConstrainLights
+    | protocol.TieLights
+    | protocol.SetMaster
+    | protocol.ShowRig
+    | protocol.ChangeSettings
+    | protocol.AddReference
+    | protocol.DropReference
+)
+
 
 class Studio:
     """A painting session with its renders and background jobs.
@@ -152,6 +175,11 @@ class Studio:
         return self._access.store
 
     @property
+    def is_ready(self) -> bool:
+        """True once the lights of the session are rendered."""
+        return self._access.is_ready
+
+    @property
     def has_scenes(self) -> bool:
         """True if there are scenes, and not only bases."""
         return self.subjects[0].scene is not None
@@ -179,6 +207,7 @@ class Studio:
         self._mixes.stop()
         self._planes.stop()
         self._write_retry.stop()
+        self._bases.close()
         with self._access.lock:
             if self._access.current is not None:
                 # Everything is stored before any solve, so a pending answer can be dropped.
@@ -208,7 +237,7 @@ class Studio:
                 "can_render": first.scene is not None,
                 "can_report": first.scene is not None or len(self.subjects) == 1,
             }
-            if session is None:
+            if session is None or (session.is_waiting and self._access.failure_text):
                 progress = self.publisher.last_progress  # of the first picture
                 return SessionPending(**fields, text=self._access.failure_text, progress=progress)
             findings = self._exact_answers.findings_of(session)
@@ -258,7 +287,9 @@ class Studio:
         if isinstance(message, protocol.Fetch):
             return [PictureData(name=message.name, data=self.resource(message.name))]
         with self._access.lock:
-            session, looks = self._access.session, self._access.looks
+            is_kept = isinstance(message, KEPT_REQUESTS)
+            session = self._access.session if is_kept else self._access.ready_session
+            looks = self._access.looks
             view, self.rig.step = 0, 1
             version = session.version
             if isinstance(message, protocol.MoveLights | protocol.PointLight):
@@ -415,11 +446,11 @@ class Studio:
 
     def _fail(self, error: Exception) -> None:
         """Report that bases cannot be obtained; without any, there is nothing to paint."""
-        has_session = self._access.current is not None
-        is_reported = not has_session and self.on_failure is not None
+        is_ready = self._access.is_ready
+        is_reported = not is_ready and self.on_failure is not None
         self._access.failure_text = background_threads.error_text(error, at_length=not is_reported)
         self.publisher.publish(Notice(text=self._access.failure_text, tone="warn"))
-        if not has_session:
+        if not is_ready:
             self.failure = error
             self.publisher.publish_made(self.state)
         if is_reported and self.publisher.is_open:
@@ -428,6 +459,8 @@ class Studio:
     def _show_new_bases(self) -> None:
         """Publish the state with new bases, and renew what was found with the earlier ones."""
         self.publisher.publish_made(self.state)
+        if not self._access.is_ready:
+            return
         self._mover.render_behind()
         self._comparison.renew()
         self._exact_answers.notify()

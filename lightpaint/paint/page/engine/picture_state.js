@@ -61,6 +61,11 @@ export class PictureState {
     return this.hasMixes && this.showsAnswer && this.mixes.detail !== null;
   }
 
+  /** Whether the view shows the current look in place of lights that it has not all received. */
+  get lacksLights() {
+    return false;
+  }
+
   /** Number of planes of the view before the planes of compared looks. */
   get mixedCount() {
     return this.hasMixes ? MIX_SLOTS : (this.state?.lights.length ?? 0);
@@ -173,19 +178,22 @@ export class PictureState {
     return isLit;
   }
 
-  /** Unchanged lights give the current look, which arrives before the planes and is denoised.
+  /** Unchanged lights give the current look, which arrives before the planes and is denoised. Others
+   * do when all planes are there.
    * @param {Float64Array} weights */
   checkPresent(weights) {
     const { screen, canvas, state, display } = this;
     const present =
       state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
     const isClean = display?.clean ?? true;
-    const isPresent =
-      isClean &&
-      !this.haveLightsMoved &&
+    const isUnchanged = () =>
       weights.every(
         (weight, i) => Math.abs(weight - (present[i] ?? 0)) <= 1e-9 * (present[i] ?? 0),
       );
+    const isPresent =
+      isClean &&
+      !this.haveLightsMoved &&
+      ((this.showsAnswer && this.lacksLights) || isUnchanged());
     this.isLookNow = isPresent;
     screen.isPresent = isPresent && this.knowsPresent;
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();

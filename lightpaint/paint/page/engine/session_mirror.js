@@ -153,6 +153,13 @@ export class SessionMirror extends PictureState {
     return this.mixedCount + (this.hasLookPlanes ? COMPARED_COUNT : 0);
   }
 
+  /** @override */
+  get lacksLights() {
+    if (this.hasMixes) return false;
+    const { loadedVersions } = this.loader;
+    return this.state?.lights.some((/** @type {any} */ _, /** @type {number} */ k) => !loadedVersions.has(`plane ${k}`)) ?? false;
+  }
+
   /** The number of planes has changed: keep the painting and fetch all planes again. */
   setPlanes() {
     const { loader, screen } = this;
@@ -268,6 +275,7 @@ export class SessionMirror extends PictureState {
       const light = Number(slot.slice(6));
       if (light >= state.lights.length) return;
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
+      if (this.screen.isPresent && !this.lacksLights) this.showWeights();
     } else if (slot.startsWith('look ')) {
       const plane = this.mixedCount + Number(slot.slice(5));
       if (plane < this.screen.count) view.setPlane(plane, /** @type {Uint16Array} */ (data), 1);

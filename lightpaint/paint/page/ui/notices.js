@@ -139,7 +139,9 @@ function runningTasks(ui, { session }) {
     tasks.push({
       name: t('Rendering the lights'),
       progress: basis,
-      text: t('You can paint already.'),
+      text: ui.areLightsUnknown
+        ? t('You can paint already: the answer comes with the lights.')
+        : t('You can paint already.'),
     });
   else if (loadProgress && loadProgress.done < loadProgress.total)
     tasks.push({ name: t('Loading the images of the lights'), progress: loadProgress });

@@ -81,8 +81,9 @@ const lookText = (ui, look) =>
 
 /** Return what a picture does not show yet; null if it is complete. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
-function missingText({ loadingLook, loadProgress }, kind) {
+function missingText({ areLightsUnknown, loadingLook, loadProgress }, kind) {
   if (loadingLook !== null) return t('loading {look} …', { look: loadingLook });
+  if (kind === 'solution' && areLightsUnknown) return t('the lights are being rendered …');
   const isIncomplete = loadProgress?.isFirst && loadProgress.done < loadProgress.total;
   return kind === 'solution' && isIncomplete ? t('some lights are still loading …') : null;
 }

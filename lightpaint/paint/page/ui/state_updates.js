@@ -68,6 +68,7 @@ export function stateUpdate(message, /** @type {Ui} */ previous) {
     planesReading: message.reading ?? null,
     ...rendersUpdate(message, previous),
     hint: Boolean(message.is_new),
+    areLightsUnknown: basis !== undefined && basis.spp === 0 && !basis.is_complete,
     connection: 'open',
     closure: null,
     // Results in the meantime were missed; tasks that still run will report again.
@@ -284,7 +285,7 @@ export function answerUpdate(message, ui) {
   if (message.reading) changes.planesReading = message.reading;
   if (message.places !== undefined) changes.places = message.places ?? '';
   if (message.lights) Object.assign(changes, answerFields(message, ui));
-  else if (!message.exact && !isSameAnswer) {
+  else if (!message.exact && !isSameAnswer && !ui.areLightsUnknown) {
     changes.isLive = true;
     changes.isJudgementCurrent = false;
     if (message.drives) changes.lightAnswers = withDrives(ui.lightAnswers, message.drives);

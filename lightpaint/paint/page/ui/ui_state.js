@@ -151,6 +151,7 @@ export function initialState() {
     // last saved or loaded, with the version and the number of steps then
     lastLook: /** @type {{look: number, version: number, steps: number} | null} */ (null),
     basis: /** @type {Progress | null} */ (null),
+    areLightsUnknown: false, // whether only a picture of the scene is there, and its lights are rendered
     verificationProgress: /** @type {Progress | null} */ (null),
     // pictures of the lights; isFirst: some of the lights have none yet
     loadProgress: /** @type {{done: number, total: number, isFirst?: boolean} | null} */ (null),
