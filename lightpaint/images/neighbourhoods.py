@@ -5,6 +5,7 @@ ordinary solve needs SciPy.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,14 +31,19 @@ def gaussian_mean(values: Floats, radius: float) -> Floats:
     result = values.astype(np.float64)
     for axis in (-2, -1):
         length = values.shape[axis]
-        lines = np.moveaxis(result, axis, 0)
-        lines = np.pad(lines, [(reach, reach)] + [(0, 0)] * (values.ndim - 1), mode="symmetric")
+        lines = np.moveaxis(result.take(_mirrored(length, reach), axis), axis, 0)
         mean = kernel[0] * lines[reach : reach + length]
         for k in range(1, reach + 1):
             before, after = (lines[reach + x :][:length] for x in (-k, k))
             mean += kernel[k] * (before + after)
         result = np.moveaxis(mean, 0, axis)
     return np.ascontiguousarray(result, values.dtype)
+
+
+@lru_cache
+def _mirrored(length: int, reach: int) -> Indices:
+    """Return the places along an axis, with so many on both sides that mirror them."""
+    return np.pad(np.arange(length), reach, mode="symmetric")
 
 
 def film_filtered(image: Doubles) -> Doubles:

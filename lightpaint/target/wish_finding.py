@@ -15,10 +15,13 @@ that nobody had. Such paint means at least its light, so it asks for the change 
 layer does where that is more.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from hashlib import blake2b
 from math import ceil
+from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +29,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import LUMINANCE, decode_display, encode_display
 from lightpaint.images import block_sums, dilated, enlarged, gaussian_mean, number_parts
+from lightpaint.progress import cancellation_check
 from lightpaint.target.painted_target import Target, Wish
 
 #: Stops by which a place must ask for something else than what is around it, to be a wish.
@@ -66,6 +70,9 @@ WITHIN_PLACE = 0.5
 
 #: Least share of a wish of one of its places: smaller ones are crumbs.
 PLACE_SHARE = 0.1
+
+#: Number of layers whose strokes are remembered: under the brush all but a few stay as they are.
+MAX_REMEMBERED = 2**8
 
 #: Weight that holds the colour of a stroke near what is painted, where the look alone does not tell
 #: how much of it covers; relative to all changes.
@@ -118,11 +125,15 @@ def split_wishes(
     small_importance = small(importance)
     painting = _Painting(small(image), small_importance, small(current_look))
     wishes: list[Wish] = []
+    check = cancellation_check()
     for layer in layers:
+        check()
         if not layer.has_strokes:
             wishes.append(layer)
             continue
-        owners, count = _owners((small(layer.area) >= PAINTED) & (small_importance > 0), painting)
+        owners, count = _REMEMBERED.owners(
+            (small(layer.area) >= PAINTED) & (small_importance > 0), painting
+        )
         places = enlarged(owners, side)[:height, :width]
         parts = (np.where(places == k, layer.area, 0) for k in range(1, count + 1))
         found = [replace(layer, area=part.astype(np.float32)) for part in parts]
@@ -156,6 +167,17 @@ class _Painting:
     image: Floats
     importance: Floats
     look: Floats
+
+    def digest(self, painted: Bools) -> bytes:
+        """Return a digest of all that the strokes of a layer, (h, w), follow from."""
+        mean = np.mean(self.look)
+        is_local = mean > 0 and painted.mean() <= MAX_STROKE_SHARE
+        where = painted if is_local else np.ones_like(painted)
+        read = painted, self.image[where], self.look[where], self.importance[where], mean
+        digest = blake2b(repr(painted.shape).encode(), digest_size=16)
+        for values in read:
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.digest()
 
     @cached_property
     def ratio(self) -> Floats:
@@ -208,7 +230,7 @@ def _wash_radius(width: int) -> float:
     return max(SMOOTHING * width, MIN_RADIUS)
 
 
-def _owners(painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.int64], int]:
+def _owners(painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.uint8], int]:
     """Number the strokes of a layer, and the places in them that ask for something else.
 
     painted: (h, w), where the layer is. Returns the number of each pixel, (h, w), 0 for none, and
@@ -217,7 +239,7 @@ def _owners(painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.int64],
     least = MIN_SHARE * painted.size
     strokes = _connected(painted, round(JOINING * painted.shape[1]), least)
     strokes = sorted(strokes, key=lambda x: -int(x.sum()))
-    owners, count = np.zeros(painted.shape, np.int64), 0
+    owners, count = np.zeros(painted.shape, np.uint8), 0
     for stroke in strokes[:MAX_WISHES]:
         count += 1
         owners[stroke] = count
@@ -227,6 +249,31 @@ def _owners(painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.int64],
             count += 1
             owners[place] = count
     return owners, count
+
+
+class _RememberedStrokes:
+    """The strokes of the layers that were looked at last, by what they follow from."""
+
+    def __init__(self) -> None:
+        self._found: OrderedDict[bytes, tuple[npt.NDArray[np.uint8], int]] = OrderedDict()
+        self._lock = Lock()
+
+    def owners(self, painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.uint8], int]:
+        """Return the same as `_owners`."""
+        key = painting.digest(painted)
+        with self._lock:
+            if key in self._found:
+                self._found.move_to_end(key)
+                return self._found[key]
+        found = _owners(painted, painting)
+        with self._lock:
+            self._found[key] = found
+            while len(self._found) > MAX_REMEMBERED:
+                self._found.popitem(last=False)
+        return found
+
+
+_REMEMBERED = _RememberedStrokes()
 
 
 def _block_means(image: Floats, *, side: int) -> Doubles:
@@ -426,11 +473,18 @@ def extend_marked(
     dark = DARK * float(np.mean(current_look))
     if not at_least.any() or not dark > 0:
         return image
-    extended, painted = image.copy(), importance > 0
-    for own in [painted & (wish.area > COVERED) for wish in layers] or [painted]:
-        usual = _median_ratio(image, current_look, own & ~at_least.any(-1), dark)
-        lifted = np.maximum(extended, (current_look * usual).astype(np.float32))
-        extended = np.where(own[..., None] & at_least, lifted, extended)
+    extended, painted, is_plain = image.copy(), importance > 0, ~at_least.any(axis=-1)
+    areas = (wish.area > COVERED for wish in layers) if layers else (painted,)
+    check = cancellation_check()
+    for area in areas:
+        check()
+        own = painted & area
+        lifted = np.nonzero(own[..., None] & at_least)
+        if not lifted[0].size:
+            continue
+        usual = _median_ratio(image, current_look, own & is_plain, dark)
+        asked = (current_look[lifted] * usual[lifted[2]]).astype(np.float32)
+        extended[lifted] = np.maximum(extended[lifted], asked)
     return extended
 
 

@@ -6,6 +6,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.primaries import decode_display, encode_display
 from lightpaint.errors import SizeError
+from lightpaint.progress import cancellable
+from lightpaint.target import wish_finding
 from lightpaint.target.painted_target import Wish, separate
 from lightpaint.target.wish_finding import asked_ratio, find_wishes, number_places
 
@@ -184,3 +186,49 @@ def test_separate_places_of_a_wish_have_numbers(squares, counts):
         area[slice(*rows), slice(*columns)] = 0.9
     numbers = number_places(area)
     assert [int((numbers == k).sum()) for k in range(1, numbers.max() + 1)] == counts[1:]
+
+
+def test_strokes_are_remembered_as_long_as_nothing_of_them_changes(monkeypatch):
+    """Under the brush most layers stay as they are, and each takes as long as the one that does
+    not.
+    """
+    looked_at, owners = [], wish_finding._owners
+
+    def counted(painted, painting):
+        looked_at.append(painted)
+        return owners(painted, painting)
+
+    monkeypatch.setattr(wish_finding, "_owners", counted)
+    monkeypatch.setattr(wish_finding, "_REMEMBERED", wish_finding._RememberedStrokes())
+    boxes = box(4, 16, 4, 20), box(24, 36, 40, 56), box(0, 40, 0, 45)
+    layers = [Wish(str(k), x.astype(np.float32), has_strokes=True) for k, x in enumerate(boxes)]
+    importance = np.ones(LOOK.shape[:2], np.float32)
+    image = np.where(boxes[0][..., None], 2 * LOOK, LOOK)
+
+    def areas(**changed):
+        of = {"image": image, "importance": importance, "current_look": LOOK} | changed
+        return [wish.area for wish in wish_finding.split_wishes(layers, **of)]
+
+    first = areas()
+    assert len(looked_at) == 3
+    np.testing.assert_array_equal(areas(), first)
+    assert len(looked_at) == 3
+    within = image.copy()
+    within[6:10, 6:10] *= 4
+    changed = areas(image=within)
+    # The second lies elsewhere; the third covers most of the picture, around which a wash reads.
+    assert len(looked_at) == 5
+    monkeypatch.setattr(wish_finding, "_REMEMBERED", wish_finding._RememberedStrokes())
+    np.testing.assert_array_equal(areas(image=within), changed)
+    areas(current_look=1.5 * LOOK)
+    assert len(looked_at) == 5 + 3 + 3
+
+
+def test_finding_wishes_ends_when_it_is_cancelled():
+    """An exact answer of many layers: the next stroke gets the processors at once."""
+
+    def stop():
+        raise KeyError
+
+    with pytest.raises(KeyError), cancellable(stop):
+        find_wishes(target(2 * LOOK), LOOK)
