@@ -369,14 +369,7 @@ class ReducedSolver:
             if optimum is not None:
                 return [optimum]
         if not self._families:
-            problems = _block_problems((M, b), coupling, reduction)
-            self._families = [self._family(p, p.M) for p in problems]
-            # Many drives give the same light. With a ridge one of them is best, and found in a
-            # sixth of the time; it is an optimum without the ridge, too, up to the tolerance.
-            self._ridged = [
-                self._family(p, p.M + np.diag(RIDGE * p.M.diagonal()))
-                for p in (problems if reduction.has_equal_mixes else ())
-            ]
+            self._make_families(_block_problems((M, b), coupling, reduction))
 
         def solve(job: tuple[Block, QuadraticFamily, QuadraticFamily | None]) -> Optimum:
             block, family, ridged = job
@@ -388,6 +381,18 @@ class ReducedSolver:
         ridged: list[QuadraticFamily | None] = [*self._ridged] or [None] * len(self._families)
         jobs = list(zip(reduction.blocks, self._families, ridged, strict=True))
         return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
+
+    def _make_families(self, problems: list[ReducedProblem]) -> None:
+        """Make the families of some problems, whose matrices can then go: the scaled ones that are
+        kept are as large.
+        """
+        self._families = [self._family(p, p.M) for p in problems]
+        # Many drives give the same light. With a ridge one of them is best, and found in a sixth of
+        # the time; it is an optimum without the ridge, too, up to the tolerance.
+        self._ridged = [
+            self._family(p, p.M + np.diag(RIDGE * p.M.diagonal()))
+            for p in (problems if self._reduction.has_equal_mixes else ())
+        ]
 
     def _solve_required(
         self,
