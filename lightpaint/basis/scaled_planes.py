@@ -38,7 +38,7 @@ class ScaledPlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        return self._picture * self._colours[i]
+        return np.asarray(self._picture * self._colours[i])
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""

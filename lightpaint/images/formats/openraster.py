@@ -233,8 +233,8 @@ def opened_openraster(
             archive = open_things.enter_context(zipfile.ZipFile(path))
             if _member(archive, STACK).file_size > MAX_STACK:
                 raise ImageError(
-                    f"declares a list of layers that is too long: expected at most {MAX_STACK >> 20} MB; "
-                    "merge some"
+                    "declares a list of layers that is too long: expected at most "
+                    f"{MAX_STACK >> 20} MB; merge some"
                 )
             text = archive.read(STACK)
             if b"<!DOCTYPE" in text or b"<!ENTITY" in text:

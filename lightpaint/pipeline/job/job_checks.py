@@ -19,7 +19,7 @@ from lightpaint.images import (
 )
 from lightpaint.lighting import Constraints, check_same_lights
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import Painting, content
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
 from lightpaint.scene import Scene
 from lightpaint.scene.lights.texels import CHILDREN, DOMAINS, Sky, mirrored_pairs, node_name
@@ -54,7 +54,9 @@ def _size_of(basis: Any) -> Size | None:
         return basis.basis.size
     if isinstance(basis, Basis):
         return basis.size
-    return picture_size(basis.path) if Path(basis.path).is_file() else None
+    if isinstance(basis, BasisFile | GroupsFile) and Path(basis.path).is_file():
+        return picture_size(basis.path)
+    return None
 
 
 def check_inputs(

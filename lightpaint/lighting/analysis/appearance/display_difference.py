@@ -372,7 +372,7 @@ def _light_of_paths(solution: Solution) -> Doubles:
     light, noise = (x.pixels(painted[::step]) for x in (basis.planes, basis.noise))
     total = light.sum(axis=1, dtype=np.float64)
     variance = np.square(noise, dtype=np.float64).sum(axis=1)
-    return np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(np.divide(variance, total, out=np.zeros_like(total), where=total > 0))
 
 
 def _local_light(solution: Solution, place: Place, weight: Floats | None = None) -> Doubles:
