@@ -313,17 +313,16 @@ def _open_output(
         if interface:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
                 tried.bind((interface, 0))
-        if target.protocol is console_target.SACN:
-            from lightpaint.dmx.sacn_output import SacnOutput
+        # These libraries take a while to import, and only who sends needs them.
+        from lightpaint.dmx.network_outputs import ArtnetOutput, SacnOutput
 
+        if target.protocol is console_target.SACN:
             return SacnOutput(
                 *(target, universes),
                 source_name=SOURCE_NAME,
                 priority=priority,
                 interface=interface,
             )
-        from lightpaint.dmx.artnet_output import ArtnetOutput
-
         return ArtnetOutput(target, universes, interface=interface)
     except OSError as error:
         raise ConsoleError(

@@ -17,8 +17,7 @@ from lightpaint.lighting.algebra.clipped_newton import (
 from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
-from lightpaint.lighting.algebra.method import Method
-from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
+from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Method, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS
-from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.optimum import (
     TOLERANCE,
     Optimum,
@@ -20,7 +19,7 @@ from lightpaint.lighting.algebra.optimum import (
     minimise,
     minimise_each,
 )
-from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
+from lightpaint.lighting.algebra.quadratic import Cap, Method, clip_to_sums
 from lightpaint.lighting.algebra.required_sums import (
     CLOSE,
     MAX_UPDATES,
