@@ -35,7 +35,7 @@ from lightpaint.placement import (
     Suggestion,
 )
 from lightpaint.progress import Progress, silent
-from lightpaint.relit import EXPORTS, Verification, verify
+from lightpaint.relit import EXPORTS, LightShares, Verification, verify, with_light_tests
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.scene import Scene, Stream, load_scene, render_features
 from lightpaint.storage.json_records import read_record, strict_json
@@ -44,6 +44,9 @@ from lightpaint.target import Target
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
+
+#: Name of all lights together, whose error a verification without their basis looks for.
+ALL_LIGHTS = "all lights"
 
 #: Files of every solve.
 SOLVE_RESULTS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
@@ -292,8 +295,9 @@ def verify_result(
 ) -> Verification:
     """Render the relit.xml of a result folder again and compare it with its predicted.exr.
 
-    spp: samples per pixel, by default those recorded in predicted.exr. Raises OutputError if
-    `folder` holds no such result, ImageError if predicted.exr is damaged.
+    spp: samples per pixel, by default those recorded in predicted.exr. Returns the power for all
+    lights together, ALL_LIGHTS: single ones are in the basis alone. Raises OutputError if `folder`
+    holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
     for candidate in (folder, folder.parent):
@@ -324,7 +328,7 @@ def verify_result(
         # A scene that was edited by hand may have another film, which `verify` refuses.
         if relit.size != film and whole_factor(relit.size, film) is not None:
             relit = relit.reduced(f"{view.width}x{view.height}")
-    return verify(
+    verification = verify(
         predicted,
         relit,
         spp=view.spp if spp is None else spp,
@@ -332,6 +336,10 @@ def verify_result(
         stream=Stream.SECOND_VERIFICATION,
         progress=progress,
     )
+    # Without the basis, only an error of all lights together can be looked for.
+    whole = LightShares.of_pictures((ALL_LIGHTS,), [predicted])
+    power = with_light_tests(verification, predicted, whole).power
+    return replace(verification, power=power)
 
 
 @dataclass(frozen=True)

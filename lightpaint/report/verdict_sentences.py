@@ -406,9 +406,12 @@ def spoken_agreement(verification: Verification) -> str:
     """Return that a render agrees, as far as it could have shown otherwise."""
     if not verification.is_blind:
         return "Rendered again: equal within noise"
-    spp = verification.spp
-    samples = "" if spp is None else f" with {spp} sample{'s' if spp > 1 else ''} per pixel"
-    return f"Rendered again{samples}: nothing found against it"
+    return f"Rendered again{_with_samples(verification.spp)}: nothing found against it"
+
+
+def _with_samples(spp: int | None) -> str:
+    """Return ` with 8 samples per pixel`; "" if it is not known."""
+    return "" if spp is None else f" with {spp} sample{'s' if spp > 1 else ''} per pixel"
 
 
 def spoken_blindness(verification: Verification) -> str:
@@ -433,18 +436,23 @@ def spoken_blindness(verification: Verification) -> str:
 
 def spoken_samples(spp: int | None) -> str:
     """Return how many samples a verification took, and what few of them mean for its picture."""
-    if spp is None:
-        return ""
-    text = f" with {spp} sample{'s' if spp > 1 else ''} per pixel"
-    return f"{text}; so few may leave out small bright patches" if spp < FEW_SPP else text
+    text = _with_samples(spp)
+    is_few = spp is not None and spp < FEW_SPP
+    return f"{text}; so few may leave out small bright patches" if is_few else text
 
 
 def agreement(verification: Verification | None) -> str:
     """Return whether prediction and verification agree, as a clause with its numbers."""
     if verification is None:
         return "the prediction is not verified by a render"
+    distance = spoken_distance(verification)
+    if verification.agrees and verification.is_blind:
+        return (
+            f"nothing found against the prediction{_with_samples(verification.spp)}, but an error "
+            f"of {100 * ERROR:.0f} % would probably not show in this render ({distance})"
+        )
     state = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
-    return f"prediction and verification {state} ({spoken_distance(verification)})"
+    return f"prediction and verification {state} ({distance})"
 
 
 def spoken_distance(verification: Verification) -> str:

@@ -113,6 +113,9 @@ def test_the_command_that_a_report_shows_works_from_any_folder(
 def test_verify_and_relight_take_the_result(solved_job: tuple[Path, str], tmp_path: Path) -> None:
     folder, _ = solved_job
     assert "agree within noise" in succeed(tmp_path, "verify", folder, "--seed", 5)
+    # All light is in the picture, and single lights are in the basis alone.
+    [document] = json.loads(succeed(tmp_path, "verify", folder, "--json"))["results"]
+    assert [*document["power"]["lights"]] == ["all lights"]
     copies = []
     for name in ("one", "two"):
         data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))

@@ -24,7 +24,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.default_solve import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report.verdict_sentences import headline, verdict
+from lightpaint.report.verdict_sentences import agreement, headline, verdict
 from lightpaint.target.painted_target import Target
 
 DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
@@ -361,3 +361,20 @@ def test_an_answer_that_is_worse_than_the_present_says_so_first():
     )
     # What nobody reads is no difference.
     assert not headline(_seen(3.42, 3.4, local_lights=("lamp",))).startswith("The current lighting")
+
+
+@pytest.mark.parametrize(
+    ("power", "words"),
+    [
+        (
+            0.01,
+            "nothing found against the prediction with 2 samples per pixel, but an error of 5 %",
+        ),
+        (0.99, "prediction and verification agree within noise ("),
+    ],
+)
+def test_a_render_that_could_not_see_an_error_agrees_with_nothing(power: float, words: str) -> None:
+    image = np.full((16, 16, 3), 0.5, np.float32)
+    picture = Estimate(image, 0.01 * np.random.default_rng(1).normal(size=image.shape))
+    checked = replace(compare(picture, picture), power={"all lights": power}, spp=2)
+    assert agreement(checked).startswith(words)
