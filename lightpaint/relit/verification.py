@@ -80,6 +80,7 @@ class Verification(Shown):
             neighbours.
         z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
             1 if there is only noise; slightly more if the noise consists of rare bright samples.
+            Blocks that both show alike and without noise are left out.
         z_mean: (3,), difference of the sums over the whole image, in standard errors.
         z_pattern: Correlation between the differences of the two halves, block by block, in
             standard errors: 0 on average for noise, larger for a local error.
@@ -207,8 +208,11 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     pooled += np.square(PRECISION * magnitude)
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
-    # A block's difference, divided by the standard error estimated from its own pixels.
+    # A block's difference, divided by the standard error estimated from its own pixels. What is the
+    # same in both without noise, like a screen in view, says nothing of their noise.
     block_z = block_sums(difference) / np.sqrt(block_sums(squares))
+    is_exact = block_sums(squares) < 2 * block_sums(np.square(PRECISION * magnitude))
+    noisy_z = block_z[~is_exact | (np.abs(block_z) > 1)]
     z_mean, z_pattern = differences(predicted, verified)
 
     scale = 2.0 ** choose_exposure(verified.image)
@@ -216,7 +220,7 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     return Verification(
         verified=verified,
         z=z.astype(np.float32),
-        z_rms=float(np.sqrt(np.square(block_z).mean())),
+        z_rms=float(np.sqrt(np.square(noisy_z).mean())) if noisy_z.size else 0.0,
         z_mean=z_mean,
         z_pattern=z_pattern,
         rmse=float(np.sqrt(np.square(difference).mean())),

@@ -163,6 +163,24 @@ def test_black_agrees_with_black_and_with_nothing_else():
     assert compare(predicted, verified).agrees
 
 
+def test_the_rms_is_of_blocks_that_have_noise():
+    """A screen in view has none, and an error there is one whatever the noise elsewhere."""
+    predicted, verified = _pair(2, _gaussian)
+    columns = 8 * (SIZE[1] // 16)
+    expected = compare(
+        *(
+            Estimate(x.image[:, columns:], x.half_difference[:, columns:])
+            for x in (predicted, verified)
+        )
+    ).z_rms
+    screen = predicted.image[:, :columns].copy()
+    for estimate in (predicted, verified):
+        estimate.image[:, :columns], estimate.half_difference[:, :columns] = screen, 0
+    assert compare(predicted, verified).z_rms == pytest.approx(expected, rel=1e-6)
+    verified.image[:, :columns] *= np.float32(1.001)
+    assert compare(predicted, verified).z_rms > 10 * expected
+
+
 def test_closed_forms():
     shape = (*SIZE, 3)
     predicted = Estimate(np.full(shape, 0.7, np.float32), np.full(shape, 0.03, np.float32))
