@@ -50,7 +50,7 @@ DECODED_MAX_BYTES = 2**26
 MIXED_PIXELS = 2**15
 
 #: Number of pixels that are encoded at a time.
-STRIP_PIXELS = 2**16
+STRIP_PIXELS = 2**14
 
 #: Exponent to which the brightest value is scaled; half floats reach 15.
 BRIGHTEST = 14
@@ -341,14 +341,14 @@ class _Strip:
 
     Most planes of many lights are dark in most pixels, and only the others take time.
 
-    lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w). hidden: the
-    largest power of a rounding error that noise hides, for each tile and channel, as `_power`
-    returns it.
+    lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w); a slice if
+    all are. hidden: the largest power of a rounding error that noise hides, for each tile and
+    channel, as `_power` returns it.
     """
 
     rows: slice
     shape: tuple[int, ...]
-    lit: Indices
+    lit: slice | Indices
     hidden: Doubles
 
     @classmethod
@@ -356,7 +356,8 @@ class _Strip:
         """Return the strip of an image and its half difference, (3, h, w) each."""
         grain = noise[:, rows]
         # By their bits, since a negative number may have been rounded to −0.
-        lit = np.flatnonzero(grain.view(np.uint32) | image[:, rows].view(np.uint32))
+        is_lit = (grain.view(np.uint32) | image[:, rows].view(np.uint32)) != 0
+        lit = slice(None) if is_lit.all() else np.flatnonzero(is_lit)
         power = _power(grain.reshape(-1)[lit], lit, grain.shape)
         return cls(rows, grain.shape, lit, HIDDEN_SHARE**2 * power)
 
@@ -429,7 +430,7 @@ def _strips(shape: tuple[int, ...]) -> Iterator[slice]:
     return (slice(top, min(top + step, height)) for top in range(0, height, step))
 
 
-def _power(values: Floats, places: Indices, shape: tuple[int, ...]) -> Doubles:
+def _power(values: Floats, places: slice | Indices, shape: tuple[int, ...]) -> Doubles:
     """Return Σ x² of each tile and channel of a strip, as one row.
 
     values: its numbers at some places in the order of memory; it is zero elsewhere. shape: (3,
