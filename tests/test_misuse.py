@@ -113,6 +113,9 @@ def test_what_is_wrong_is_named(values: dict[str, Any], tmp_path: Path) -> None:
         (lambda: scene.only(5), r"Scene.only\(\): names is 5"),
         (lambda: basis.mix("x"), r"Basis.mix\(\): weights is a str, expected an array"),
         (lambda: basis.mix(np.full((3, 3), np.inf)), "weights that are infinite or no numbers"),
+        (lambda: basis.mix(np.full((3, 3), 1e300)), "weights that are complex or beyond"),
+        (lambda: basis.mix(np.ones((3, 3), complex)), "weights that are complex or beyond"),  # type: ignore[arg-type]
+        (lambda: lp.Constraints("key"), "lights is 'key': expected entries as"),  # type: ignore[arg-type]
         (lambda: basis.predict(np.full((3, 3), np.nan)), "weights that are infinite or no numb"),
         (lambda: basis.on_pixels(np.ones((3, 2)), basis.noise, None), r"images of shape \(3, 2\)"),
         (

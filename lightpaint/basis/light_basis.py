@@ -19,7 +19,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images import Estimate, Features, Objects, SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
-from lightpaint.validation import check_shape
+from lightpaint.validation import BRIGHTEST, check_shape
 from lightpaint.version import __version__
 
 #: Maximum number of samples per pixel, beyond the number of any render.
@@ -418,12 +418,14 @@ class Basis(Shown):
         return self.planes.mixes(weights)
 
     def _check_weights(self, weights: Doubles) -> None:
-        """Raise BasisError unless there are three finite weights for each light."""
+        """Raise BasisError unless there are three weights for each light, real and bounded."""
         expected = (len(self.lights), 3)
         if np.shape(weights):
             check_shape("weights", weights, expected, "a row per light", error=BasisError)
         if not np.isfinite(weights).all():
             raise BasisError("weights that are infinite or no numbers: expected amounts of light")
+        if np.iscomplexobj(weights) or np.abs(weights).max(initial=0) > BRIGHTEST:
+            raise BasisError(f"weights that are complex or beyond {BRIGHTEST:g}")
 
     def predict(self, weights: Doubles) -> Estimate:
         """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).

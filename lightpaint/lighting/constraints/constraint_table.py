@@ -234,6 +234,14 @@ class Constraints:
     prefer_emitters: Preference | None = None
     requirements: Requirements | None = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.lights, tuple) or not isinstance(self.ties, tuple):
+            wrong = self.lights if not isinstance(self.lights, tuple) else self.ties
+            name = "lights" if wrong is self.lights else "ties"
+            raise ConstraintError(
+                f"{name} is {wrong!r}: expected entries as Constraints.of makes them of tables"
+            )
+
     def __repr__(self) -> str:
         parts = [f"{name} {_label(table)}" for name, table, _ in self.lights]
         parts += [f"tie {' + '.join(tie.lights)}" for tie in self.ties]
