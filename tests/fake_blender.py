@@ -63,7 +63,9 @@ def fake_blender() -> tuple[ModuleType, ModuleType]:
     bpy.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
     scene_link = SimpleNamespace(link=lambda item: None)
     scene = SimpleNamespace(collection=SimpleNamespace(objects=scene_link))
-    layer = SimpleNamespace(update=lambda: None)
+    shown = SimpleNamespace(hide_render=False, objects=())
+    layers = SimpleNamespace(collection=shown, exclude=False, children=())
+    layer = SimpleNamespace(update=lambda: None, layer_collection=layers)
     bpy.context = SimpleNamespace(scene=scene, view_layer=layer)  # type: ignore[attr-defined]
     vectors.Matrix = FakeMatrix  # type: ignore[attr-defined]
     return bpy, vectors

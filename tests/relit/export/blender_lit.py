@@ -158,6 +158,16 @@ def main():
         lamps[1].light_linking.receiver_collection = bpy.data.collections.new("all")
         lamps[1].light_linking.receiver_collection.objects.link(bpy.data.objects["Plane"])
     lamps[3].visible_glossy = False
+    # A portal gives no light, and one without shadows too much.
+    lamps[4].data.cycles.is_portal, lamps[0].data.use_shadow = True, False
+    away = bpy.data.collections.new("away")
+    scene.collection.children.link(away)
+    away.hide_render = True
+    inner = bpy.data.collections.new("inner")
+    away.children.link(inner)
+    stored = lamp("stored", "POINT")
+    scene.collection.objects.unlink(stored)
+    inner.objects.link(stored)
     runpy.run_path(str(FOLDER / "set_scene.py"))
     radiances = {}
     for one in (*lamps, panel, None):

@@ -28,7 +28,9 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
         **dict.fromkeys(("panel", "desk", "sky", *MESHES), "radiance"),
-        **dict.fromkeys(("bulb", "spot", "grouped", "profile", "tile", "wrong sun"), "intensity"),
+        **dict.fromkeys(
+            ("bulb", "spot", "grouped", "profile", "tile", "stored", "wrong sun"), "intensity"
+        ),
         **dict.fromkeys(("sun", "wrong bulb"), "irradiance"),
         "gone": "radiance",
     }
@@ -46,6 +48,8 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
         assert (f"nodes of '{name}'" in output) != is_whole, name
     for name, is_seen in {"bulb": True, "spot": False, "desk": False}.items():
         assert (f"keeps '{name}' from" in output) != is_seen, name
+    for name, is_hidden in {"stored": True, "half": True, "bulb": False, "sky": False}.items():
+        assert (f"'{name}' is hidden from renders" in output) == is_hidden, name
     values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
     # Irradiance of a white floor: I/d², L·A/d² of what is small, all of a sky π L; over π of it.
     falls = {"bulb": 1 / 4, "spot": 1 / 4, "tile": 1 / 4, "sun": 1.0, "sky": math.pi}
@@ -58,3 +62,4 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     kept = json.loads(next(x for x in output.splitlines() if x.startswith("KEPT"))[5:])
     assert {"Emission Color", "Emission Strength"} <= {*kept[0]}
     assert "spread" in kept[3]
+    assert "is_portal" in kept[4]
