@@ -134,7 +134,8 @@ def _rounded(image: Floats, layer: RenderLayer) -> Floats:
     bound = (size * HALF_PRECISION + SUBNORMAL if layer.is_half else 0) + size * SUM_PRECISION
     if layer.loss:
         brightest = _brightest_in_block(size)
-        bound = bound + compression_errors(layer.compression, layer.loss, brightest)
+        losses = layer.compression, layer.loss, brightest
+        bound = bound + compression_errors(*losses, is_half=layer.is_half)
     return np.asarray(bound)
 
 

@@ -40,12 +40,14 @@ SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 #: that is compressed at once: measured on smooth, noisy and sparse images, of which 2e-4 of all
 #: light lies beyond. Of those in CURVED, which quantise x^(1 / CURVE_POWER) below 1, log x above,
 #: it is the share at 1; in the dark it is larger. The figure of DWA is for its default level, to
-#: which it is proportional, down to the rounding along its curve.
+#: which it is proportional, down to the rounding along its curve. LJ2K of float32 is off by up to
+#: LJ2K_LEAST in blocks however dark.
 COMPRESSION_LOSS = {
     **{"PXR24": 2.0**-16, "B44": 0.04, "B44A": 0.04},
     **{"DWAA": 0.02, "DWAB": 0.02, "LJ2K": 0.02},
 }
 CURVED, CURVE_POWER, CURVE_ROUNDING = ("DWAA", "DWAB", "LJ2K"), 2.2, 2.0**-9
+LJ2K_LEAST = 2e-3
 DWA_LEVEL_KEY, DEFAULT_DWA_LEVEL = "dwaCompressionLevel", 45.0
 
 #: Arrays (height, width) by channel name.
@@ -227,14 +229,18 @@ def _compression(header: Mapping[str, Any]) -> tuple[str, float]:
     return name, loss
 
 
-def compression_errors(compression: str, loss: float, brightest: Floats) -> Floats:
+def compression_errors(
+    compression: str, loss: float, brightest: Floats, *, is_half: bool
+) -> Floats:
     """Return the largest errors of a compression, (h, w, 3), where the brightest value of each
-    block of pixels is `brightest`, at least 0. loss: as in ExrPart.
+    block of pixels is `brightest`, at least 0. loss: as in ExrPart. is_half: whether it is of half
+    floats.
     """
     if compression in CURVED:  # the inverse of the slope of its curve
         dark = np.power(np.minimum(brightest, 1), 1 - 1 / CURVE_POWER)
         brightest = np.maximum(brightest, dark)
-    return np.asarray(loss * brightest)
+    least = LJ2K_LEAST if compression == "LJ2K" and not is_half else 0.0
+    return np.asarray(np.maximum(loss * brightest, least))
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:

@@ -180,6 +180,19 @@ def test_compression_loses_more_of_dark_pictures(tmp_path: Path, compression: st
     assert read_light_groups(**dark).has_rest
 
 
+@pytest.mark.parametrize("light", [1e-6, 1e-5, 1e-4, 1e-3])
+def test_lj2k_of_floats_loses_as_much_of_the_darkest_specks(tmp_path: Path, light: float):
+    """A pixel of a hundred is lit; its error is that of one that is a thousand times brighter."""
+    rng = np.random.default_rng(4)
+    size = (3, 64, 96, 3)
+    images = (light * (rng.random(size) < 0.01) * rng.random(size)).astype(np.float32)
+    layers = {"Combined": images.sum(axis=0)}
+    layers |= {f"Combined_{name}": image for name, image in zip("abc", images, strict=True)}
+    header = {"compression": OpenEXR.LJ2K_COMPRESSION}
+    path = interleaved(tmp_path / "a.exr", layers, kind=np.float32, header=header)
+    assert not read_light_groups(path).has_rest
+
+
 @pytest.mark.parametrize("level", [0.0, 1.0, 10.0, 200.0])
 @pytest.mark.parametrize("light", [1e-3, 1, 1000])
 def test_what_dwa_loses_grows_with_its_level(tmp_path: Path, level: float, light: float):
