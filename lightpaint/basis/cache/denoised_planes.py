@@ -211,7 +211,7 @@ def obtain_denoised_planes(
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    planes = _read(basis, factor, look_factor)
+    planes = read_denoised_planes(basis, factor=factor, look_factor=look_factor)
     if planes is None:
         keys = [] if factor > 1 and _file_key(basis) else _content_keys(basis)
         shared = _read_shared(basis, keys, factor) if keys else {}
@@ -251,17 +251,10 @@ def read_denoised_planes(
     factor: side of blocks; planes of such blocks are accepted as well as whole planes. look_factor:
     side of the blocks of the current look beside planes of blocks.
     """
-    with suppress(OSError, LightpaintError):
-        if not basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX).exists():
-            return None  # before all planes are read for their keys
-    return _read(basis, factor, look_factor)
-
-
-def _read(basis: Basis, factor: int, look_factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
         path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
-        if not basis_cache.is_own(path):
-            return None
+        if not path.exists() or not basis_cache.is_own(path):
+            return None  # before all planes are read for their keys
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
             if not _is_made_of(file_arrays, basis):
                 return None

@@ -244,4 +244,4 @@ def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
     if not has_clear_surfaces(loaded):
         return np.zeros(scene.size, dtype=bool)
     depth = depth_limit(scene.integrator)
-    return emitters_seen_through(view_of(scene, loaded), depth, samples=SEEN_SAMPLES, seed=0)
+    return emitters_seen_through(view_of(scene, loaded), depth, samples=SEEN_SAMPLES)

@@ -152,12 +152,9 @@ def next_whites(
     return reduction, optimum
 
 
-def center_windows(reduction: Reduction, weights: Doubles, width: int = 1) -> Reduction:
-    """Return the reduction with windows of `width` pieces about the whites nearest to weights.
-
-    weights: (n, 3).
-    """
-    return reduction.with_windows(_windows_about(_groups(reduction), weights, width))
+def center_windows(reduction: Reduction, weights: Doubles) -> Reduction:
+    """Return the reduction with windows of one piece about the whites nearest to weights (n, 3)."""
+    return reduction.with_windows(_windows_about(_groups(reduction), weights, 1))
 
 
 def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:

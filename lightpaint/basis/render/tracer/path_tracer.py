@@ -406,13 +406,13 @@ def has_clear_surfaces(loaded: Any) -> bool:
     return any(mi.has_flag(flags, kind) for flags in surfaces for kind in clear)
 
 
-def emitters_seen_through(view: View, max_depth: int, *, samples: int, seed: int) -> Bools:
+def emitters_seen_through(view: View, max_depth: int, *, samples: int) -> Bools:
     """Return the pixels of a view, (h, w), in which some sample sees an emitter."""
     count = view.width * view.height
     seen = np.zeros(count, bool)
     sampler = mi.load_dict({"type": "independent"})
     for k in range(samples):
-        sampler.seed(seed + k, count)
+        sampler.seed(k, count)
         pixel = dr.arange(mi.UInt32, count)
         seen |= np.array(_sees_emitter(view, sampler, pixel, mi.UInt32(max_depth)))
     return seen.reshape(view.height, view.width)
