@@ -43,8 +43,6 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         parser.print_help()
         return 0
     if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
-        from lightpaint.cli.dispatcher import complete
-
         complete(parser)
     options = parser.parse_args(words)
     mode = OutputMode(options.as_json, options.is_quiet, options.is_verbose, options.json_progress)
