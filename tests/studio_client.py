@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,22 @@ import numpy as np
 from patience import PATIENCE_S
 
 import lightpaint as lp
+from lightpaint.basis.light_basis import PLAIN_LOOK
+from lightpaint.basis.scaled_planes import ScaledPlanes
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
+
+
+def look_of(basis: lp.Basis) -> lp.Basis:
+    """The picture of a basis that stands in until its lights are rendered."""
+    planes = ScaledPlanes.summing_to(basis.current_look, basis.current_weights)
+    origin = replace(basis.origin, method=PLAIN_LOOK, halves=(0, 0), passes=(0, 0))
+    noise = np.zeros((*basis.images.shape,), np.float32)
+    return replace(basis, planes=planes, noise=noise, origin=origin, features=None, objects=None)
 
 
 class StudioClient:

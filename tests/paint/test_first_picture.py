@@ -2,18 +2,15 @@
 
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from patience import PATIENCE_S
-from studio_client import StudioClient
+from studio_client import StudioClient, look_of
 
 import lightpaint as lp
-from lightpaint.basis.light_basis import PLAIN_LOOK
-from lightpaint.basis.scaled_planes import ScaledPlanes
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
@@ -28,14 +25,6 @@ def basis(make_basis: Any) -> lp.Basis:
     images = np.repeat(np.stack([left, left[:, ::-1]])[..., None], 3, axis=-1)
     two: lp.Basis = make_basis(images=images, emission=[[0.5, 0.5, 0.5]] * 2)
     return two
-
-
-def look_of(basis: lp.Basis) -> lp.Basis:
-    """A picture in place of the lights of a basis."""
-    planes = ScaledPlanes.summing_to(basis.current_look, basis.current_weights)
-    origin = replace(basis.origin, method=PLAIN_LOOK, halves=(0, 0), passes=(0, 0))
-    noise = np.zeros((*basis.images.shape,), np.float32)
-    return replace(basis, planes=planes, noise=noise, origin=origin, features=None, objects=None)
 
 
 class WaitingClient(StudioClient):

@@ -46,6 +46,7 @@ class PaintedRoom:
         self.thread = threading.Thread(target=self.server.run, daemon=True)
         self.thread.start()
         self.studio.start()
+        wait_until(lambda: self.studio.is_ready)
         page.goto(self.server.url)
         page.wait_for_selector(".lightpaint .tag")
         page.keyboard.press("d")

@@ -23,6 +23,7 @@ from console_rigs import COLORS, SacnFields, lamp, open_port, sacn_fields
 from nightly import nightly
 from patience import PATIENCE_S
 from renderer import REPOSITORY
+from studio_client import look_of
 
 import lightpaint as lp
 from lightpaint.basis import denoise_mix
@@ -832,10 +833,46 @@ class Rendering(Subject):
         announced.set()
 
 
+class Beginning(Subject):
+    """A scene of which a picture comes before its lights."""
+
+    def bases(self, progress: Any = None) -> Iterator[lp.Basis]:
+        [rendered] = self.folder.events  # type: ignore[attr-defined]
+        assert self.basis is not None
+        yield look_of(self.basis)
+        rendered.wait(60)
+        yield self.basis
+
+
 class Folder(type(Path())):  # type: ignore[misc]
     """A folder that carries what its test waits for."""
 
     events: tuple[threading.Event, ...]
+
+
+def test_one_paints_on_the_first_picture_and_is_answered_by_the_lights(
+    basis: lp.Basis, tmp_path: Path, open_page: Any
+) -> None:
+    folder = Folder(tmp_path)
+    folder.events = (threading.Event(),)
+    painter = ServedPainter(Beginning("room.xml", folder, basis=basis))
+    try:
+        user = open_page(painter, viewport={"width": 1280, "height": 720})
+        user.page.get_by_text("Answer: the lights are being rendered …").wait_for()
+        user.ready()
+        user.press(*FIRM).drag(user.at(20, 20), user.at(40, 20))
+        user.page.get_by_text("what you paint is kept, and answered then").wait_for()
+        np.testing.assert_allclose(user.seen(30, 20), user.code(user.paint), atol=1)
+        session = painter.studio.session
+        np.testing.assert_array_equal(session.weights, basis.current_weights)
+        folder.events[0].set()
+        user.page.get_by_text("Answer: the lights are being rendered …").wait_for(state="detached")
+        user.still("brush").ready()
+        assert not np.allclose(session.weights, basis.current_weights)
+        np.testing.assert_allclose(user.seen(30, 20), user.code(user.paint), atol=1)
+        np.testing.assert_allclose(user.seen(70, 40, 1), user.answered(70, 40), atol=1)
+    finally:
+        painter.close()
 
 
 @pytest.mark.nightly

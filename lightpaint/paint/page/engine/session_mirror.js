@@ -157,7 +157,8 @@ export class SessionMirror extends PictureState {
   get lacksLights() {
     if (this.hasMixes) return false;
     const { loadedVersions } = this.loader;
-    return this.state?.lights.some((/** @type {any} */ _, /** @type {number} */ k) => !loadedVersions.has(`plane ${k}`)) ?? false;
+    const lights = /** @type {any[]} */ (this.state?.lights ?? []);
+    return lights.some((_, k) => !loadedVersions.has(`plane ${k}`));
   }
 
   /** The number of planes has changed: keep the painting and fetch all planes again. */
