@@ -32,6 +32,7 @@ from lightpaint.lighting.unknowns.gamuts import PaintedLight
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
+from lightpaint.progress import cancellation_check
 from lightpaint.target import Target
 
 #: Largest relative error of one rounding to float16 and to float32.
@@ -197,11 +198,15 @@ class Problem(linear_problem.LinearProblem):
             all_constraints = all_constraints.and_then(constraints)
         all_constraints = with_scale(all_constraints, bases[0].lights)
         whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
+        check = cancellation_check()  # each step of a painting of many layers takes a while
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
+        check()
         squares, loss = _losses(views, whole, fit)
+        check()
         reference = start_weights(all_constraints.start, whole.lights)
         reading = ViewsReading(views, whole.power, reference, fit)
         terms = reading.terms()
+        check()
         gamuts = reading.gamuts(around_of(terms.expected))
         whites = linear_problem.whites_for(terms.expected, fit)
         reduction = linear_problem.reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
