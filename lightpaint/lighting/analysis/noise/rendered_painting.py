@@ -122,6 +122,8 @@ def is_made_by_lights(solution: Solution) -> bool | None:
     told.
     """
     missed = _MissedLight.of(solution)
+    if not missed.squares:  # no residual counts in a picture that is white, as it was painted
+        return False
     if not (missed.has_grain() and missed.is_white(FAR)):
         return False
     if missed.squares < SQUARES_PER_LIGHT * (~solution.basis.is_fixed).sum():
