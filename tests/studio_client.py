@@ -11,8 +11,8 @@ import numpy as np
 from patience import PATIENCE_S
 
 import lightpaint as lp
+from lightpaint.basis.derived_planes import ScaledPlanes
 from lightpaint.basis.light_basis import PLAIN_LOOK
-from lightpaint.basis.scaled_planes import ScaledPlanes
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message

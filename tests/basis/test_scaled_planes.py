@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lightpaint.basis.derived_planes import ScaledPlanes
 from lightpaint.basis.planes import MemoryPlanes
-from lightpaint.basis.scaled_planes import ScaledPlanes
 
 PICTURE = np.random.default_rng(1).random((5, 7, 3), np.float32)
 WEIGHTS = np.array([[2, 0, 1], [0.5, 0, 1], [0, 0, 3.0]])

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.derived_planes import ScaledPlanes
 from lightpaint.basis.light_basis import PLAIN_LOOK, Basis
 from lightpaint.basis.render.rendered_basis import basis_lights, origin_of
-from lightpaint.basis.scaled_planes import ScaledPlanes
 from lightpaint.images import denoised, resampled
 from lightpaint.scene import (
     Scene,

@@ -23,21 +23,6 @@ export function toFloats(halves, scale = 1) {
   return values;
 }
 
-/** Write light, not below 0, as the nearest halves; the array of these. Light above the largest half
- * becomes that, and less than 0 black.
- * @param {Float32Array} light @param {Uint16Array} halves */
-export function writeHalves(light, halves) {
-  const bits = new Uint32Array(light.buffer, light.byteOffset, light.length);
-  for (let i = 0; i < light.length; i++) {
-    const value = light[i];
-    // Below the smallest normal half they are multiples of 2^-24. Above it the exponent counts from
-    // 15 instead of 127, and 13 bits fewer are kept.
-    if (value < 2 ** -14) halves[i] = value > 0 ? Math.round(value * 2 ** 24) : 0;
-    else halves[i] = value < MAX_HALF ? (bits[i] - 0x38000000 + 0x1000) >>> 13 : 0x7bff;
-  }
-  return halves;
-}
-
 function decodeAll() {
   const values = new Float32Array(65536);
   for (let bits = 0; bits < 65536; bits++) {

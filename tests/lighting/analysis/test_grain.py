@@ -107,7 +107,9 @@ def test_a_render_as_painting_lacks_nothing_that_lights_could_give(
     assert plain.share(plain.painting_noise) > (0.9 if is_known else 0.95)
     assert "is out of reach of any mix" not in " ".join(error_sentences(plain)).split(",")[0]
     explanation = (
-        "of the painting, as renders have" if is_known else "of the painting or of the lights'"
+        "finer detail of the painting than light can show"
+        if is_known
+        else "of the painting or of the lights'"
     )
     assert explanation in error_sentences(plain)[0]
     # The stroke is there as before, and is no noise.

@@ -1,5 +1,5 @@
 /** Enlarges small pictures that come with answers to paint, which need few bytes, to drafts. */
-import { toFloats, writeHalves } from '../../../viewer/drawing/half_floats.js';
+import { MAX_HALF, toFloats } from '../../../viewer/drawing/half_floats.js';
 
 /** Averages over blocks of pixels. size: rows and columns of blocks. halves: (rows, columns, 3).
  * @typedef {{halves: Uint16Array, size: [rows: number, columns: number]}} SmallPicture */
@@ -72,4 +72,19 @@ function placesOf(pixels, step, length, count) {
     share[k] = clamped - first[k];
   }
   return { count, first, share };
+}
+
+/** Write light, not below 0, as the nearest halves; the array of these. Light above the largest half
+ * becomes that, and less than 0 black.
+ * @param {Float32Array} light @param {Uint16Array} halves */
+export function writeHalves(light, halves) {
+  const bits = new Uint32Array(light.buffer, light.byteOffset, light.length);
+  for (let i = 0; i < light.length; i++) {
+    const value = light[i];
+    // Below the smallest normal half they are multiples of 2^-24. Above it the exponent counts from
+    // 15 instead of 127, and 13 bits fewer are kept.
+    if (value < 2 ** -14) halves[i] = value > 0 ? Math.round(value * 2 ** 24) : 0;
+    else halves[i] = value < MAX_HALF ? (bits[i] - 0x38000000 + 0x1000) >>> 13 : 0x7bff;
+  }
+  return halves;
 }
