@@ -77,6 +77,7 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     replacements = {
         "load_scene": lambda _path, sensor, **_: sensors.append(sensor),
         "verify": lambda *_args, spp, **_options: sensors.append(spp),
+        "_with_power_for_all": lambda verification, _predicted: verification,
     }
     for name, function in replacements.items():
         monkeypatch.setattr(look, name, function)

@@ -6,8 +6,8 @@ from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     # fmt: off
+    from lightpaint.lighting.algebra import Method
     from lightpaint.lighting.algebra.optimum import minimise
-    from lightpaint.lighting.algebra.quadratic import Method
     from lightpaint.lighting.analysis.answer_analysis import Analysis, analyse, with_findings
     from lightpaint.lighting.analysis.appearance.answer_appearance import (
         CLOSE, INVISIBLE, Appearance, compare_appearance, with_undetermined,

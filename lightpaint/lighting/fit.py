@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.algebra.quadratic import Method
+from lightpaint.lighting.algebra import Method
 from lightpaint.sentences import Hint
 from lightpaint.validation import Option, a, check_fields, number
 

@@ -336,7 +336,13 @@ def verify_result(
         stream=Stream.SECOND_VERIFICATION,
         progress=progress,
     )
-    # Without the basis, only an error of all lights together can be looked for.
+    return _with_power_for_all(verification, predicted)
+
+
+def _with_power_for_all(verification: Verification, predicted: Estimate) -> Verification:
+    """Return `verification` with its power for an error of all lights together: without a basis,
+    nothing is known of each.
+    """
     whole = LightShares.of_pictures((ALL_LIGHTS,), [predicted])
     power = with_light_tests(verification, predicted, whole).power
     return replace(verification, power=power)

@@ -540,7 +540,7 @@ def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
 
 
 def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
-    room = write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"])
+    room = write_room(tmp_path)
     text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
     room.write_text(text, encoding="utf-8")
     assert "-D width=VALUE" in run_refused(tmp_path, "lights", room)

@@ -155,7 +155,7 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
     page = unescape((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
     assert "path:max_depth=6, not the scene's own" in page
     # The relit scene says it itself.
-    assert "agree within noise" in succeed(tmp_path, "verify", "out")
+    assert "agree within noise" in succeed(tmp_path, "verify", "out", "--spp", 256)
     succeed(tmp_path, "relight", path, "out/lighting.json", *chosen, "-o", "again")
     second_relit, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
     assert second_relit.read_bytes() == relit.read_bytes()

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Indices
+from lightpaint.lighting.algebra import Method
 from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.clipped_newton import (
     MANY_UNKNOWNS,
@@ -17,7 +18,7 @@ from lightpaint.lighting.algebra.clipped_newton import (
 from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
-from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Method, Quadratic, scaled
+from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
 

@@ -6,7 +6,6 @@ The limits a_k, "caps", have positive coefficients and share no unknown.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +16,6 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 #: An unknown whose M_ii is below this share of the greatest changes nothing that counts.
 UNREACHED_POWER = 1e-24
-
-#: How an optimum is found: by Newton's method on the active set, which falls back on the paper's
-#: iteration; or by that one alone.
-Method = Literal["polished", "gauss-seidel"]
 
 NOT_FINITE = "M and b must be finite: some picture has a pixel that is not"
 

@@ -29,9 +29,10 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra import Method
 from lightpaint.lighting.algebra.dual_active_set import DualActiveSet, NearAnswer
 from lightpaint.lighting.algebra.optimum import TOLERANCE, Optimum, QuadraticFamily
-from lightpaint.lighting.algebra.quadratic import Cap, Method
+from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.progress import cancellation_check
 
 #: Weight of the penalty, relative to a unit diagonal of M; its growth where the sums approach

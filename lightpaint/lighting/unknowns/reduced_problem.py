@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra import Method
 from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS
 from lightpaint.lighting.algebra.optimum import (
     TOLERANCE,
@@ -19,7 +20,7 @@ from lightpaint.lighting.algebra.optimum import (
     minimise,
     minimise_each,
 )
-from lightpaint.lighting.algebra.quadratic import Cap, Method, clip_to_sums
+from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.algebra.required_sums import (
     CLOSE,
     MAX_UPDATES,
