@@ -32,6 +32,7 @@ from lightpaint.errors import (
 )
 from lightpaint.images import picture_size
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.pipeline.job import job_checks
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painted_target import Target
@@ -419,6 +420,22 @@ def test_a_painting_of_another_size_is_not_decoded(
     for basis in (BasisFile("a.basis.exr"), GroupsFile("groups.exr")):
         with pytest.raises(SizeError, match=rf"large\.{kind} is 23x17 but the basis is"):
             Job((), (Painting(path.name),), folder / "out", basis)
+
+
+def test_a_painting_far_larger_than_the_film_is_not_decoded(
+    room: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless it has whole blocks of pixels, or is to be resampled."""
+    monkeypatch.setattr(job_checks, "LARGE_PAINTING", 2000)
+    monkeypatch.setattr("lightpaint.pipeline.job.sources.read_target", _not_to_be_called)
+    (height, width), scene = load_scene(room).size, SceneFile(str(room))
+    for size, error in (((61, 53), SizeError), ((9 * height, 9 * width), AssertionError)):
+        Image.fromarray(np.full((*size, 3), 90, np.uint8)).save(folder / "large.png")
+        with pytest.raises(error, match=r"large\.png is 53x61|decoded"):
+            Job((scene,), (Painting("large.png"),), folder / "out")
+    Image.fromarray(np.full((61, 53, 3), 90, np.uint8)).save(folder / "large.png")
+    with pytest.raises(AssertionError, match="decoded"):
+        Job((scene,), (Painting("large.png"),), folder / "out", settings=Settings(resize=True))
 
 
 def test_the_size_of_a_damaged_picture_is_left_to_its_reader(folder: Path) -> None:

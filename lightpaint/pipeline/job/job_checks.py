@@ -3,6 +3,7 @@ remarks for the user before a job runs, in plain text.
 """
 
 from collections.abc import Mapping, Sequence
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,11 @@ from lightpaint.images import (
 )
 from lightpaint.lighting import Constraints, check_same_lights
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, content
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, SceneFile, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
 from lightpaint.scene import Scene
 from lightpaint.scene.lights.texels import CHILDREN, DOMAINS, Sky, mirrored_pairs, node_name
-from lightpaint.scene.quality_presets import PRESETS
+from lightpaint.scene.quality_presets import PRESETS, on_film
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target import Target, check_fits
@@ -31,21 +32,38 @@ from lightpaint.target import Target, check_fits
 #: Emitters that shine from all directions.
 SKY_PLUGINS = [plugin for plugin, domain in DOMAINS.items() if isinstance(domain, Sky)]
 
+#: Pixels above which a painting is compared with the film of a scene before it is decoded.
+LARGE_PAINTING = 2**22
+
 #: Bytes of memory above which a basis gets a remark.
 MUCH_MEMORY = 2e9
 
 
-def check_sizes(targets: Sequence[Any], bases: Sequence[Any], settings: Settings) -> None:
+def check_sizes(targets: Sequence[Any], sources: Sequence[Any], settings: Settings) -> None:
     """Raise SizeError for a painting of another size than its basis, before any is decoded.
 
-    targets, bases: as given.
+    targets, sources: as given; scenes if there are no bases. To read a scene takes longer than to
+    decode most paintings, so these are asked for their film only by large ones.
     """
-    for target, basis in zip(targets, bases, strict=False):
+    for target, source in zip(targets, sources, strict=False):
         if settings.resize or not isinstance(target, Painting):
             continue
-        size, needed = picture_size(target.path), _size_of(basis)
-        if size is not None and needed is not None:
+        if (size := picture_size(target.path)) is None:
+            continue
+        if isinstance(source, Scene | SceneFile):
+            needed = _film_below(size, source, settings) if prod(size) > LARGE_PAINTING else None
+        else:
+            needed = _size_of(source)
+        if needed is not None:
             check_fits(Path(target.path), size, needed)
+
+
+def _film_below(size: Size, scene: Scene | SceneFile, settings: Settings) -> Size | None:
+    """Return the (height, width) of a film with fewer pixels than a painting; else None, since a
+    scene is reduced to smaller paintings.
+    """
+    film = on_film(content(scene), settings.quality, settings.resolution).size
+    return film if prod(film) < prod(size) else None
 
 
 def _size_of(basis: Any) -> Size | None:

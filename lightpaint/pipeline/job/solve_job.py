@@ -137,7 +137,7 @@ class Job:
         job_checks.check_inputs(self.scenes, self.targets, given, self.constraints, self.settings)
         if not self.scenes:
             check_nothing_unused(self.settings, given[0])
-        job_checks.check_sizes(self.targets, given, self.settings)
+        job_checks.check_sizes(self.targets, given or self.scenes, self.settings)
         # Paintings and bases are read in parallel; an error in a painting is reported first.
         contents = parallel_map(content, [*self.targets, *given])
         targets, read = (
