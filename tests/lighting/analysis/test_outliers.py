@@ -185,6 +185,20 @@ def test_peaks_by_hand():
     assert peaks.hidden()[0] == 0
 
 
+def test_peaks_of_a_light_that_hardly_pushes_are_as_those_of_any_other():
+    """In units of 1e-90, whose fourth powers are 0 in float64."""
+    possible, push = np.full((1, 50), 0.1), np.full((1, 50), 0.01)
+    possible[0, :2], push[0, :2] = (3, 2), (0.3, 0.1)
+    found = []
+    for unit in (1.0, 1e-90):
+        peaks = Peaks.empty(1)
+        peaks.add(unit * possible, unit * push, unit * push, _rare)
+        found.append(peaks.hidden()[0] / unit**2)
+    assert found[0] > 0
+    # Rounded squares.
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
 def test_many_paths_limit_the_variance_of_a_pixel(share: float):
     """Means of samples that meet an emitter or not, which is the widest that radiance up to 1 may

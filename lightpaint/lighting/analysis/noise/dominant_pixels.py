@@ -122,11 +122,12 @@ class Peaks:
         for k in np.unique(lights[is_peak]):
             own_peaks = is_peak & (lights == k)
             could, observed = float(u2[own_peaks].sum()), float(z2[own_peaks].sum())
+            shares = u2[own_peaks] / could
             rest = float(self.total[k]) - could
             share_of_others = (
                 float(self.pushed[k] - observed) / rest if rest > 1e-9 * could else 0.0
             )
-            wider = t_ratios(could**2 / np.square(u2[own_peaks]).sum())
+            wider = t_ratios(1 / (shares @ shares))
             seen = max(observed, float(v2[own_peaks].sum()))
             variance = max(seen / could * float(wider) ** 2, MAX_UNLIKE * share_of_others)
             most = float(limits[own_peaks] @ u2[own_peaks])
