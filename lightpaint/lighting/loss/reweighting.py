@@ -46,9 +46,11 @@ KEPT_PROMISE, SHORTEST_STEP = 1e-4, 2.0**-20
 #: Share of the loss that is round-off of its sums.
 ROUND_OFF = 1e-12
 
-#: Largest predicted decrease, as a share of the loss, at which a step that fails to lower the loss
-#: counts as converged: views of OpenColorIO are float32, and their slopes are finite differences.
-FLAT_FALL = 1e-5
+#: Largest predicted decrease, as a share of the loss and of the loss in the dark, at which a step
+#: that fails to lower the loss counts as converged: views of OpenColorIO are float32, and their
+#: slopes are finite differences; and a last pixel may be a trace below white, where others turn
+#: less than white at once.
+FLAT_FALL, FLAT_FALL_OF_DARK = 1e-5, 1e-11
 
 #: The least number of pixels in a sample, and the pixels for each light.
 MIN_SAMPLE, PIXELS_PER_LIGHT = 2**13, 2**6
@@ -256,7 +258,8 @@ def run_rounds(
                 continue
             done = False
         if done or part == 0 or count >= MAX_ROUNDS:
-            small = done or (part == 0 and round_.fall <= FLAT_FALL * value)
+            least_fall = max(FLAT_FALL * value, FLAT_FALL_OF_DARK * in_the_dark)
+            small = done or (part == 0 and round_.fall <= least_fall)
             weights = interpolate(w, round_.best, part) if is_worse else round_.best
             squares = round_.image, round_.weight, round_.equations
             return RoundsResult(weights, w, x, from_clipping, *squares, count, round_.step, small)
