@@ -38,14 +38,29 @@ class PaintReading(ABC):
     """The demands of paintings on lights, beside their squares: expected lights, gamuts and terms.
 
     bases: of the views. power: (n, 3), ‖Φᵢ‖² of all views together. own: (n, 3), weights with the
-    colours that lights have. fit: with nothing left open. is_sketch: as for `Fit.reads_wishes`.
+    colours that lights have. fit: with nothing left open. constraints: on the lights. is_sketch: as
+    for `Fit.reads_wishes`.
     """
 
     def __init__(
-        self, bases: Sequence[Basis], power: Doubles, own: Doubles, fit: Fit, *, is_sketch: bool
+        self,
+        bases: Sequence[Basis],
+        power: Doubles,
+        own: Doubles,
+        fit: Fit,
+        *,
+        constraints: Constraints,
+        is_sketch: bool,
     ) -> None:
         self.bases, self.power, self.own, self.fit = tuple(bases), power, own, fit
-        self.is_sketch = is_sketch
+        self.is_sketch, self._constraints = is_sketch, constraints
+
+    @cached_property
+    def is_free(self) -> Bools:
+        """(n,), lights that may stand in for others: nothing limits them."""
+        lights = self.bases[0].lights
+        limited = light_constraints.limited_lights(self._constraints, lights)
+        return ~(limited | texel_lights(lights))
 
     @abstractmethod
     def wash(self) -> Wash:
@@ -75,13 +90,14 @@ class PaintReading(ABC):
             importance=importance,
             unpainted=unpainted,
             texels=texel_lights(self.bases[0].lights),
+            is_free=self.is_free,
         )
 
     def expected(self) -> ExpectedLights | None:
         """Return the lights that paintings let one expect; None if the fit leaves colours free."""
         if self.fit.colors not in ("gentle", "white"):
             return None
-        return ExpectedLights.of(self.wash(), self.own)
+        return ExpectedLights.of(self.wash(), self.own, self.is_free)
 
     def gamuts(self, around: Callable[[], Doubles] | None) -> Gamuts | None:
         """Return the colours that each light may take; None if the fit does not limit them.

@@ -204,7 +204,7 @@ class Problem(linear_problem.LinearProblem):
         squares, loss = _losses(views, whole, fit)
         check()
         reference = start_weights(all_constraints.start, whole.lights)
-        reading = ViewsReading(views, whole.power, reference, fit)
+        reading = ViewsReading(views, whole.power, reference, fit, all_constraints)
         terms = reading.terms()
         check()
         gamuts = reading.gamuts(around_of(terms.expected))
@@ -407,8 +407,8 @@ def _resolve_views(
 class ViewsReading(linear_problem.PaintReading):
     """The demands of the paintings of views on their lights.
 
-    power, own, fit: as in `PaintReading`. wash: returns the wash of the views, by default a new
-    one.
+    power, own, fit, constraints: as in `PaintReading`. wash: returns the wash of the views, by
+    default a new one.
     """
 
     def __init__(
@@ -417,9 +417,17 @@ class ViewsReading(linear_problem.PaintReading):
         power: Doubles,
         own: Doubles,
         fit: Fit,
+        constraints: Constraints,
         wash: Callable[[], Wash] | None = None,
     ) -> None:
-        super().__init__(views.bases, power, own, fit, is_sketch=are_sketches(views))
+        super().__init__(
+            views.bases,
+            power,
+            own,
+            fit,
+            constraints=constraints,
+            is_sketch=are_sketches(views),
+        )
         self._views, self._wash = views, partial(wash_of, views) if wash is None else wash
 
     def wash(self) -> Wash:

@@ -13,6 +13,7 @@ from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
 from lightpaint.lighting.linear_problem import PaintReading
 from lightpaint.lighting.loss import weight_penalty
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
 from lightpaint.lighting.problem import Problem
@@ -142,6 +143,62 @@ def test_lamps_that_only_dim_cost_nothing(make_basis: Any):
     dimmed = basis.current_weights * np.array([[0.2], [3.0], [0.0], [1.0]])
     target = replace(lp.Target.of(basis.mix(dimmed).astype(np.float32)), over_look=True)
     np.testing.assert_allclose(lp.solve(basis, target).weights, dimmed, rtol=1e-5, atol=1e-6)
+
+
+#: A wash of two lamps beside each other on a bar, amber and blue, and a lamp elsewhere.
+BAR = {"amber": (0.8, 0.4, 0.06), "blue": (0.03, 0.08, 0.8), "side": (0.2, 0.2, 0.2)}
+
+
+def _bar(make_basis: Any) -> tuple[lp.Basis, lp.Target]:
+    """The lamps, and a painting in which what the bar lights is as blue as its blue lamp."""
+    shapes = np.ones((3, 12, 16))
+    shapes[0] += 0.4 * np.linspace(-1, 1, 16)  # the amber one is a little beside
+    shapes[:2, :, 11:] = shapes[2, :, :11] = 0.02
+    basis = make_basis(
+        images=shapes[..., None] * np.ones(3), names=list(BAR), emission=list(BAR.values())
+    )
+    night = basis.mix(np.array([(0, 0, 0), (0.05, 0.13, 1.3), BAR["side"]])).astype(np.float32)
+    # Amber light alone could fall off as the brush did.
+    night[:, :11] *= shapes[0][:, :11, None].astype(np.float32)
+    painted = lp.Target.of(night)
+    return basis, replace(painted, transform=SRGB, through_view=True, over_look=True)
+
+
+def test_a_lamp_beside_one_of_the_painted_colour_keeps_its_own(make_basis: Any):
+    """The blue lamp lights the night, not the amber one turned blue, though that fits better."""
+    basis, target = _bar(make_basis)
+    amber, blue, _ = lp.solve(basis, target).weights
+    # As blue as it was, and amber but for a trace.
+    np.testing.assert_allclose(blue / blue[2], np.array(BAR["blue"]) / 0.8, atol=0.05)
+    assert blue[2] > BAR["blue"][2]
+    assert amber.max() < 0.1 * BAR["amber"][0]
+
+
+def test_a_lamp_takes_the_painted_colour_where_the_one_beside_it_is_locked(make_basis: Any):
+    basis, target = _bar(make_basis)
+    locked = lp.Constraints.of({"blue": {"off": True}})
+    amber, blue, _ = lp.solve(basis, target, constraints=locked).weights
+    assert not blue.any()
+    assert amber[2] > 5 * amber[0]
+    assert amber[2] > 10 * BAR["amber"][2]
+
+
+def test_alike_are_lights_of_one_shape(make_basis: Any):
+    basis, target = _bar(make_basis)
+    assert Wash.of(basis, target).alike.tolist() == [[0, 1], [1, 0]]
+    assert not Wash.of(_basis(make_basis), _paint(_basis(make_basis))).alike.size
+
+
+def test_of_lamps_beside_each_other_those_change_that_bring_what_is_missing(make_basis: Any):
+    """A blue deeper than the blue lamp's: it becomes deeper, and the amber one stays."""
+    basis, target = _bar(make_basis)
+    deep = target.image * np.float32([0.02, 0.02, 1])
+    wash = Wash.of(basis, replace(target, image=deep))
+    amber, blue, _ = ExpectedLights.of(wash, basis.current_weights).clarity
+    assert amber < 0.01
+    assert blue > 0.99
+    alone = ExpectedLights.of(wash, basis.current_weights, np.array([True, False, True])).clarity
+    assert alone[:2].min() > 0.99
 
 
 def test_colors_that_were_asked_for_are_not_pulled(make_basis: Any):

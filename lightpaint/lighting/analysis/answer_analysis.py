@@ -336,7 +336,7 @@ def without_constraints(solution: Solution) -> Solution | None:
     if not problem.constraints or solution.whole is not None:
         return None
     own = problem.basis.current_weights
-    reading = ViewsReading(problem.views, problem.power, own, problem.fit)
+    reading = ViewsReading(problem.views, problem.power, own, problem.fit, problem.constraints)
     gamuts = reading.gamuts(around_of(problem.expected))
     whites = whites_for(problem.expected, problem.fit)
     free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts, whites)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles
+from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis import Basis, BasisLight, Lights, light_images
 from lightpaint.colour import cct_and_duv
 from lightpaint.display_text import some_names, with_similar_name
@@ -114,6 +114,16 @@ def constraints_on_parts(
     own = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if is_own)
     rest = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if not is_own)
     return constraint_table.Constraints(lights=own), replace(constraints, lights=rest)
+
+
+def limited_lights(
+    constraints: constraint_table.Constraints, lights: Sequence[BasisLight]
+) -> Bools:
+    """Return which lights constraints of their own, a tie or the scene limit, (n,)."""
+    tables = ConstraintsByLight.of(constraints, lights).tables
+    limited = np.array([bool(x) or y.is_fixed for x, y in zip(tables, lights, strict=True)], bool)
+    limited[list(tied_lights(constraints, lights))] = True
+    return limited
 
 
 def tied_lights(

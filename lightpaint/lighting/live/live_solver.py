@@ -119,7 +119,7 @@ class _Improved:
 class LiveReading(linear_problem.PaintReading):
     """The demands of live views on their lights, read anew as they are painted.
 
-    films: of the views, together. problem: has lights, reference and fit.
+    films: of the views, together. problem: has lights, reference, constraints and fit.
     """
 
     def __init__(
@@ -127,7 +127,14 @@ class LiveReading(linear_problem.PaintReading):
     ) -> None:
         bases = [view.basis for view in views]
         own, fit = problem.reference, problem.fit
-        super().__init__(bases, _power(views), own, fit, is_sketch=is_sketch)
+        super().__init__(
+            bases,
+            _power(views),
+            own,
+            fit,
+            constraints=problem.constraints,
+            is_sketch=is_sketch,
+        )
         self.views, self._films, self._unpainted = views, films, 0.0
         self._washed: Wash | None = None
         self._expected: ExpectedLights | None = None

@@ -6,7 +6,7 @@ from math import ceil
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats, Slices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, Slices
 from lightpaint.basis import Basis, Planes, array_name, array_once, multipliers_in, read_look
 from lightpaint.colour import ViewTransform, from_rec709, to_rec709
 from lightpaint.images import block_mean, block_sums, enlarged
@@ -15,6 +15,7 @@ from lightpaint.lighting.loss.expected_lights import (
     ON_EMITTERS,
     FlameWishes,
     Wash,
+    alike_lights,
     are_outlined,
     counted_wishes,
     joint_cover,
@@ -195,7 +196,8 @@ class SmallFilm:
             self.rows, self._owns_rows = self.rows.copy(), True
         for k in lights:
             self.rows[:, k] = _planes(self.average(basis.planes.plane(k)))
-        self.__dict__.pop("_multiplied_rows", None)
+        for kept in ("_multiplied_rows", "_alike"):
+            self.__dict__.pop(kept, None)
 
     def update(self, region: Slices) -> None:
         """Average anew the blocks that a rectangle touches."""
@@ -337,9 +339,25 @@ class SmallFilm:
         exact = joint_cover([x for x in wishes if x.is_exact], self._size)
         strokes = joint_cover([x for x in wishes if x.has_strokes], self._size)
         places = wish_places(shares, self._size)
-        light = self.rows, painted.reshape(-1, 3).T, self._current
-        outlined = are_outlined(wishes)
-        return Wash(*light, importance, counts, shares, exact, strokes, places, flames, outlined)
+        return Wash(
+            self.rows,
+            painted.reshape(-1, 3).T,
+            self._current,
+            importance,
+            counts,
+            shares,
+            exact,
+            strokes,
+            places,
+            flames,
+            are_outlined(wishes),
+            self._alike,
+        )
+
+    @cached_property
+    def _alike(self) -> Indices:
+        """Pairs of lights that shine alike, (m, 2)."""
+        return alike_lights(self.rows)
 
     def _flames(self, covers: Sequence[Wish], layers: LayerWishes) -> FlameWishes:
         """Return the wishes for emitters in view. covers: the wishes averaged over blocks."""

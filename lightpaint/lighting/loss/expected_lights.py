@@ -7,7 +7,7 @@ to its colour may be, and how much light, how dim it will be.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import ceil, sqrt
 from typing import Self
 
@@ -22,7 +22,7 @@ from lightpaint.basis import (
     read_look_noise,
     read_look_side,
 )
-from lightpaint.colour import luminance
+from lightpaint.colour import LUMINANCE, luminance
 from lightpaint.images import block_sums, enlarged
 from lightpaint.target import Target, Wish, extend_saturated, number_places, split_wishes
 from lightpaint.threads import one_thread
@@ -58,6 +58,15 @@ MIN_ADJUSTED = 0.1
 
 #: Approximate number of blocks of a wish that are compared for it.
 ADJUSTED_BLOCKS = 2**10
+
+#: Cosine between the light of two lamps in the blocks of a picture from which one may stand in for
+#: the other, and the approximate number of these blocks. Lamps beside each other on a bar have .98
+#: and more, no others of the scenes in scenes/ more than .73.
+ALIKE, ALIKE_BLOCKS = 0.9, 2**11
+
+#: Cosine between the light of a lamp and the light that is missing, from 0 down, from which the
+#: lamp does not bring what is missing at all.
+AGAINST = -0.25
 
 #: Share of a wish that lies on emitters in view from which it is a wish for their own light, and
 #: the approximate number of pixels over which that light is averaged.
@@ -117,7 +126,7 @@ class Wash:
     numbers; strokes: (p,), the cover of layers of strokes. places: (k, p), the number of the
     separate place of each wish to which a block belongs, and 0 for none. flames: the wishes for
     emitters in view. is_outlined: whether layers say where wishes end, and none was found in
-    strokes.
+    strokes. alike: (m, 2), see `alike_lights`.
     """
 
     rows: Floats
@@ -131,6 +140,7 @@ class Wash:
     places: Indices
     flames: FlameWishes
     is_outlined: bool = False
+    alike: Indices = field(default_factory=lambda: np.zeros((0, 2), np.intp))
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -154,7 +164,18 @@ class Wash:
             first += len(view.wishes)
         flames = FlameWishes.joined([x.flames for x in views])
         is_outlined = all(view.is_outlined for view in views)
-        return cls(**joined, wishes=wishes, places=places, flames=flames, is_outlined=is_outlined)
+        alike = np.array(
+            sorted(set.intersection(*({(i, j) for i, j in x.alike.tolist()} for x in views))),
+            np.intp,
+        ).reshape(-1, 2)
+        return cls(
+            **joined,
+            wishes=wishes,
+            places=places,
+            flames=flames,
+            is_outlined=is_outlined,
+            alike=alike,
+        )
 
     def sample(self, count: int, count_of_wish: int) -> tuple[Indices, Doubles]:
         """Return about `count` painted blocks, (m,), and the number of painted pixels for which
@@ -209,7 +230,7 @@ class PaintedBlocks:
     rows: (3, n, p), Φ. painted, look: (h, w, 3), linear. importance, counts: (h, w), as in `Wash`.
     read_look: (h, w, 3), the look with little noise, under which wishes are found. layers: the
     wishes of a painting with layers, with an area of a value for each block. flames: its wishes for
-    emitters in view.
+    emitters in view. alike: (m, 2), see `alike_lights`.
     """
 
     rows: Floats
@@ -220,6 +241,7 @@ class PaintedBlocks:
     counts: Doubles
     layers: Sequence[Wish]
     flames: FlameWishes
+    alike: Indices
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> Self:
@@ -244,7 +266,8 @@ class PaintedBlocks:
         seen = basis.emitters_seen
         flames = FlameWishes.of(basis.planes, seen, target.image, target.importance, target.wishes)
         rows = light_rows(basis.planes, counted, side)
-        return cls(rows, painted, look, clean, importance, counts, layers, flames)
+        alike = alike_lights(rows)
+        return cls(rows, painted, look, clean, importance, counts, layers, flames, alike)
 
     @property
     def wash(self) -> Wash:
@@ -266,6 +289,7 @@ class PaintedBlocks:
             wish_places(wishes, self.importance.shape),
             self.flames,
             are_outlined(self.layers),
+            self.alike,
         )
 
 
@@ -323,6 +347,25 @@ def light_rows(planes: Planes, counted: Doubles, side: int) -> Floats:
     """Return planes averaged over blocks, (3, n, p). counted: (h, w), the weight of each pixel."""
     means = block_means(planes, counted, side).pixels(slice(None))
     return np.ascontiguousarray(means.transpose(2, 0, 1))
+
+
+def alike_lights(rows: Floats) -> Indices:
+    """Return the pairs of lights that shine alike, whatever their colours, (m, 2), in both orders.
+
+    rows: (3, n, p), Φ averaged over blocks.
+    """
+    n, side = rows.shape[1], max(1, rows.shape[2] // ALIKE_BLOCKS)
+    kept = rows[..., : rows.shape[2] // side * side].reshape(3, n, -1, side)
+    light = np.tensordot(LUMINANCE.astype(np.float32), kept.mean(axis=-1), axes=1)
+    length = np.linalg.norm(light, axis=1, keepdims=True)
+    light /= np.where(length > 0, length, 1)
+    pairs = [np.zeros((0, 2), np.intp)]
+    with one_thread():
+        for first in range(0, n, CHUNK):
+            i, j = np.nonzero(light[first : first + CHUNK] @ light.T >= ALIKE)
+            others = i + first != j
+            pairs.append(np.stack([i[others] + first, j[others]], axis=1))
+    return np.concatenate(pairs)
 
 
 def _block_side(size: tuple[int, int]) -> int:
@@ -435,13 +478,15 @@ class ExpectedLights:
     painted: Doubles
 
     @classmethod
-    def of(cls, wash: Wash, current: Doubles) -> "ExpectedLights":
-        """Expect lights of a painting. current: (n, 3), their current emission.
+    def of(cls, wash: Wash, current: Doubles, is_free: Bools | None = None) -> "ExpectedLights":
+        """Expect lights of a painting. current: (n, 3), their current emission. is_free: (n,),
+        lights that may stand in for others; None for all.
 
         The change of light i in channel c is the mean change that is asked for, weighted by how
         much of the light in each pixel a unit of it makes: Σ D a Φᵢ / L / Σ Φᵢ / L, with the change
         a in stops and the look L; its level is the luminance of that. The colour that is asked for
-        is the RMS of a's range over the channels, with the same weights; numbers count as meant.
+        is the RMS of a's range over the channels, with the same weights; numbers count as meant. It
+        counts as far as lights that shine alike do not bring it in their own colours.
         """
         dark = DARK * float(np.mean(wash.look)) or 1.0
         stops = wash.asked()
@@ -454,8 +499,14 @@ class ExpectedLights:
         reached, squares = sums.sum(axis=1), squares.sum(axis=1)
         change = moved / np.where(sums > 0, sums, 1)
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
+        pairs = wash.alike if is_free is None else wash.alike[is_free[wash.alike].all(axis=1)]
+        brings: float | Doubles = 1.0
+        if len(pairs):
+            light = wash.light_sums(wash.counts[None])[..., 0].T * current
+            needed, brings = _needed_colors(light, change, pairs)
+            amount *= needed
         excess = (amount / MEANT_STOPS) ** SHARPNESS
-        clarity = np.asarray(excess / (1 + excess), np.float64)
+        clarity = np.asarray(brings * excess / (1 + excess), np.float64)
         emission, painted = (
             np.asarray(current * 2.0 ** np.clip(x, -MOST_STOPS, MOST_STOPS))
             for x in (luminance(change)[:, None], change)
@@ -466,3 +517,34 @@ class ExpectedLights:
     def unchanged(cls, current: Doubles) -> "ExpectedLights":
         """Expect lights to stay as they are. current: (n, 3)."""
         return cls(current, np.zeros(len(current)), current)
+
+
+def _needed_colors(light: Doubles, change: Doubles, pairs: Indices) -> tuple[Doubles, Doubles]:
+    """Return the share of the change of colour that each light's neighbours leave, (n,), and how
+    far the light itself brings what is missing, (n,): 1 and 1 for lights without any.
+
+    The light T that is asked for where some lights shine alike is the sum of their light times the
+    change. The mix of their own colours nearest to it has min ‖T − Σⱼ gⱼ cⱼ‖. The range over the
+    channels of what is left of log₂ T, of the range of the change, is needed of other colours, and
+    of those lights alone whose own do not point away from what is missing.
+
+    light: (n, 3), in the picture, of the current emission. change: (n, 3), in stops. pairs: (m, 2),
+    see `alike_lights`.
+    """
+    from scipy.optimize import nnls
+
+    needed, brings = np.ones((2, len(light)))
+    spread = np.ptp(change, axis=1)
+    for k in np.unique(pairs[:, 0]):
+        colors = light[[k, *pairs[pairs[:, 0] == k, 1]]]
+        asked = colors.sum(axis=0) * 2.0 ** np.clip(change[k], -MOST_STOPS, MOST_STOPS)
+        if not (asked > 0).all() or not spread[k] > 0:
+            continue
+        mix = nnls(colors.T, asked)[0] @ colors
+        left = np.ptp(np.log2(np.maximum(mix / asked, np.finfo(np.float32).tiny)))
+        needed[k] = min(left / spread[k], 1)
+        own, missing = colors[0], asked - mix
+        lengths = float(np.linalg.norm(own) * np.linalg.norm(missing))
+        if lengths > 0:
+            brings[k] = np.clip(1 - own @ missing / lengths / AGAINST, 0, 1)
+    return needed, brings

@@ -305,11 +305,13 @@ class PaintTerms:
         importance: float,
         unpainted: float,
         texels: Bools,
+        is_free: Bools,
     ) -> Self:
         """Read the terms of a sketch.
 
         own: (n, 3), weights with the colours that lights have. importance: of all pixels together.
         unpainted: the weight of each unpainted pixel. texels: (n,), lights that are texels.
+        is_free: as for `ExpectedLights.of`.
         """
         keeps_colors = fit.colors in ("gentle", "white")
         texel_weights = own * texels[:, None] if texels.any() else None
@@ -318,7 +320,7 @@ class PaintTerms:
         # The picture of a footprint has its own contrast.
         left = 1.0 if footprint is None else 1 - footprint.confidence
         return cls(
-            expected_lights.ExpectedLights.of(wash, own) if keeps_colors else None,
+            expected_lights.ExpectedLights.of(wash, own, is_free) if keeps_colors else None,
             _sum(
                 contrast.term(left * importance),
                 None

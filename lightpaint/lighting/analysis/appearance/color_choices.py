@@ -173,7 +173,9 @@ def _with_colors(
     wash: as of `ViewsReading`. Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
-    reading = ViewsReading(problem.views, problem.power, problem.reference, fit, wash)
+    reading = ViewsReading(
+        problem.views, problem.power, problem.reference, fit, problem.constraints, wash
+    )
     reads_wishes = fit.reads_wishes(is_sketch=reading.is_sketch)
     if problem.fit.reads_wishes(is_sketch=reading.is_sketch) != reads_wishes:
         problem = replace(problem, **vars(reading.terms()))

@@ -335,7 +335,8 @@ def _without(problem: Problem, change: Doubles, share: float) -> Problem:
         for k, target in enumerate(views.targets)
     ]
     other = problem.with_paintings(images)
-    terms = ViewsReading(other.views, other.power, other.reference, other.fit).terms()
+    reading = ViewsReading(other.views, other.power, other.reference, other.fit, other.constraints)
+    terms = reading.terms()
     return replace(
         other,
         reduction=problem.full,

@@ -183,7 +183,9 @@ def _answer_to_reading(solution: Solution, wash: Wash) -> Doubles:
     """Return the weights, (n, 3), of the last linear problem with what a wash asks for."""
     problem = solution.problem
     own, fit = problem.reference, problem.fit
-    terms = ViewsReading(problem.views, problem.power, own, fit, lambda: wash).terms()
+    constraints = problem.constraints
+    reading = ViewsReading(problem.views, problem.power, own, fit, constraints, lambda: wash)
+    terms = reading.terms()
     return solve_for(replace(solution, problem=replace(problem, **vars(terms))), problem.solved)
 
 
