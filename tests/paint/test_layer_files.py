@@ -4,7 +4,7 @@ import io
 import json
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from layered_sessions import SIZES, RandomEditor, bases_of, identity_of, open_se
 from nightly import FIFTHS, fifth_of, seeds
 from paint_programs import needs, run
 from patience import PATIENCE_S
+from picture_files import png
 from PIL import Image
 
 import lightpaint as lp
@@ -26,13 +27,21 @@ from lightpaint.errors import ImageError, PaintError
 from lightpaint.images import formats
 from lightpaint.images.formats import openraster
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
-from lightpaint.images.formats.openraster import RasterGroup, opened_openraster
+from lightpaint.images.formats.openraster import (
+    DIGEST,
+    NOTE,
+    RasterGroup,
+    RasterLayer,
+    opened_openraster,
+    write_openraster,
+)
 from lightpaint.paint import protocol
 from lightpaint.paint.layers import layer_files
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.canvases import LayeredPaintings
-from lightpaint.paint.layers.composition import compose_layer
+from lightpaint.paint.layers.composition import ShownLayer, compose, compose_layer, with_effect
 from lightpaint.paint.layers.layer_files import (
+    FORMAT,
     KEY,
     LOOK_NAME,
     read_layers,
@@ -40,7 +49,7 @@ from lightpaint.paint.layers.layer_files import (
     write_layers_openraster,
 )
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import Layer, LayerStack
+from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerStack
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Pixels
@@ -222,6 +231,93 @@ def test_an_openraster_file_comes_back_as_layers_of_paint(tmp_path: Path) -> Non
     # White is at 4; 16 bits of a display value, whose light has 2.4 times its relative error.
     np.testing.assert_allclose(pixels.image[0, 0], (2.0, 1.0, 0.5), rtol=2e-4)
     np.testing.assert_allclose(pixels.importance, 0.5, atol=1e-5)
+
+
+def test_an_openraster_file_brings_adjustments_back(tmp_path: Path) -> None:
+    """On their own, in a group that doubles their stops, and as a gradient."""
+    half = (np.arange(SIZE[1]) < 35) * np.ones(SIZE)
+    gradient = Gradient("linear", (0.0, 6.0), (70.0, 6.0))
+    view = layered(
+        (Layer(1, "paint", "Lamp"), (0.4, 0.2, 0.1), half),
+        (Layer(2, "adjust", "Darker", gain=0.25, strength=0.5, importance=3), 0.0, 0.5 * half),
+        (Layer(4, "adjust", "Warm", tint=(1.2, 1.0, 0.8), group=3), 0.0, half[:, ::-1]),
+        (Layer(5, "gradient", "Left", gain=2.0, gradient=gradient), 0.0, 1.0),
+        group=Layer(3, "group", "Night", strength=2.0, importance=2.0),
+    )
+    path = tmp_path / "layers.ora"
+    write_layers_openraster(path, view, CURRENT, TRANSFORM)
+    again = read_layers(path, SIZE, TRANSFORM)
+    layers = {layer.name: layer for layer in again.layers}
+    kinds = {name: layer.kind for name, layer in layers.items() if name != "Painting"}
+    adjustments = dict.fromkeys(("Darker", "Warm", "Left"), "adjust")
+    assert kinds == {"Lamp": "paint", "Night": "group", **adjustments}
+    darker, warm = layers["Darker"], layers["Warm"]
+    assert (darker.gain, darker.strength, darker.importance) == (0.25, 0.5, 3)
+    assert (warm.tint, warm.strength, warm.importance) == ((1.2, 1.0, 0.8), 2, 2)
+    assert warm.group == layers["Night"].id
+    pixels = {number: LayerPixels(SIZE) for number in again.layers.ids}
+    for (_, number), (region, part) in again.pixels.items():
+        pixels[number].put(region, part)
+    expected, found = composed(view.layers, view.pixels), composed(again.layers, pixels)
+    # 16 bits of a display value, whose light has 2.4 times its relative error; and of coverage.
+    np.testing.assert_allclose(found.image, expected.image, rtol=1e-3)
+    np.testing.assert_allclose(found.importance, expected.importance, atol=1e-4)
+
+
+def composed(layers: LayerStack, pixels: Mapping[int, LayerPixels]) -> Pixels:
+    """Return the target that layers come to, without accents."""
+    shown = [with_effect(x, pixels[x.id], lambda: None) for x in layers.shown() if x.id in pixels]
+    return compose([ShownLayer(*pair, 1.0) for pair in shown], CURRENT, WHOLE)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "change", "kind"),
+    [
+        ({}, lambda codes: codes, "adjust"),
+        ({"name": "Dim", "visibility": "hidden"}, lambda codes: codes, "adjust"),
+        ({}, lambda codes: np.where(codes[..., 3:] > 0, codes, 0), "adjust"),
+        ({DIGEST: ""}, lambda codes: codes, "paint"),
+        ({NOTE: ""}, lambda codes: codes, "paint"),
+        ({"x": "1"}, lambda codes: codes, "paint"),
+        ({"opacity": "0.5"}, lambda codes: codes, "paint"),
+        ({}, lambda codes: codes - np.uint16(codes > 40000), "paint"),
+        ({}, lambda codes: (codes >> 8).astype(np.uint8), "paint"),
+    ],
+)
+def test_pixels_that_a_program_changes_win_over_the_note_of_an_adjustment(
+    tmp_path: Path, attributes: dict[str, str], change: Callable[[Any], Any], kind: str
+) -> None:
+    path = tmp_path / "layers.ora"
+    half = (np.arange(SIZE[1]) < 35) * np.ones(SIZE)
+    view = layered((Layer(1, "adjust", "Darker", gain=0.25), 0.0, half))
+    write_layers_openraster(path, view, CURRENT, TRANSFORM)
+    with opened_openraster(path) as (_, items):
+        codes = np.round(65535 * list(items)[1].display).astype(np.uint16)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    root = ElementTree.fromstring(members["stack.xml"])
+    layer = root[0][0]
+    layer.attrib.update(attributes)
+    members |= {"stack.xml": ElementTree.tostring(root), layer.attrib["src"]: png(change(codes))}
+    path.write_bytes(archived(members))
+    again = read_layers(path, SIZE, TRANSFORM)
+    [found] = [x for x in again.layers if x.name in ("Darker", "Dim")]
+    assert found.kind == kind
+    assert found.gain == (0.25 if kind == "adjust" else 1)
+    assert found.is_visible == ("visibility" not in attributes)
+    assert again.pixels[0, found.id][1].image.any() == (kind == "paint")
+
+
+@pytest.mark.parametrize(
+    "note", ["{", "[]", '{"format": "x", "kind": "adjust"}', '"gain": -1', '"id": 3']
+)
+def test_a_damaged_note_of_a_layer_is_refused_in_one_line(tmp_path: Path, note: str) -> None:
+    path = tmp_path / "layers.ora"
+    start = f'{{"format": "{FORMAT}", "kind": "adjust", '
+    text = note if note[0] in "{[" else f"{start}{note}}}"
+    write_openraster(path, [RasterLayer("one", np.ones((*SIZE, 4)), note=text)], CURRENT, {})
+    with pytest.raises(ImageError, match=r"layers\.ora is damaged: the note of a layer"):
+        read_layers(path, SIZE, TRANSFORM)
 
 
 def test_files_without_usable_layers_are_refused_in_one_line(tmp_path: Path) -> None:

@@ -2,10 +2,12 @@
 
 An OpenRaster archive (version 0.0.5 of the format) has its media type first, uncompressed;
 `stack.xml`, which lists layers and groups with the topmost first; a PNG for each layer, with its
-corner in the picture; the merged picture and a thumbnail of it.
+corner in the picture; the merged picture and a thumbnail of it. A layer of ours may have a note, in
+attributes that other programs ignore, and drop when they save.
 """
 
 import errno
+import hashlib
 import lzma
 import math
 import struct
@@ -152,6 +154,12 @@ def _copy(source: IO[bytes], target: IO[bytes], length: int, kind: str) -> None:
 MEDIA_TYPE, STACK, THUMBNAIL = "image/openraster", "stack.xml", "Thumbnails/thumbnail.png"
 VERSION, OVER = "0.0.5", "svg:src-over"
 
+#: Attributes of a layer, in a namespace of their own: its note, and the SHA-256 of the layer to
+#: which it belongs.
+NAMESPACE = "urn:lightpaint:openraster"
+NOTE, DIGEST = f"{{{NAMESPACE}}}note", f"{{{NAMESPACE}}}digest"
+ElementTree.register_namespace("lightpaint", NAMESPACE)
+
 #: Largest size of the list of layers in bytes, and largest number in it.
 MAX_STACK, MAX_NUMBER = 2**22, 1e6
 
@@ -168,7 +176,8 @@ class RasterLayer:
     """A layer of an OpenRaster file.
 
     display: (rows, columns, 4), display values and alpha from 0 to 1, colour not multiplied by
-    alpha. corner: (y, x) of its first pixel in the picture.
+    alpha. corner: (y, x) of its first pixel in the picture. note: text for whoever wrote the file;
+    of a layer whose picture, place or opacity another program changed, it is read as "".
     """
 
     name: str
@@ -176,6 +185,18 @@ class RasterLayer:
     corner: tuple[int, int] = (0, 0)
     opacity: float = 1.0
     is_visible: bool = True
+    note: str = ""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the picture in 16 bits, its place and opacity.
+
+        Colour without coverage does not count, since programs drop it.
+        """
+        codes = np.round(self.display * 65535).astype(">u2")
+        codes[codes[..., 3] == 0] = 0
+        place = f"{codes.shape} {self.corner} {self.opacity:.6g} "
+        return hashlib.sha256(place.encode() + codes.tobytes()).hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,13 +347,16 @@ def _read_layer(element: ElementTree.Element, archive: zipfile.ZipFile, place: P
     display[..., :3] = bitmap.values / codes
     if bitmap.alpha is not None:
         display[..., 3] = bitmap.alpha / codes
-    return RasterLayer(
+    layer = RasterLayer(
         element.get("name", ""),
         display,
         corner=(round(_number(element, "y", 0.0)), round(_number(element, "x", 0.0))),
         opacity=_number(element, "opacity", 1.0),
         is_visible=_is_visible(element),
+        note=element.get(NOTE, ""),
     )
+    is_as_written = not layer.note or layer.digest == element.get(DIGEST)
+    return layer if is_as_written else replace(layer, note="")
 
 
 @naming_damage()
@@ -380,6 +404,9 @@ def _element(layer: RasterLayer, source: str) -> ElementTree.Element:
         visibility=_eye(layer),
     )
     element.set("composite-op", OVER)
+    if layer.note:
+        element.set(NOTE, layer.note)
+        element.set(DIGEST, layer.digest)
     return element
 
 

@@ -3,7 +3,7 @@ each comes to, and where it applies.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -25,7 +25,7 @@ from lightpaint.paint.layers.composition import (
     effect_of,
     gradient_pixels,
 )
-from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
 from lightpaint.paint.store.session_file import StoredComposition
 from lightpaint.target import Target
@@ -370,13 +370,15 @@ def _with_marks(pixels: Pixels, before: Pixels) -> Pixels:
 class LayerPicture:
     """A layer as a program shows it that only lays pictures over each other.
 
-    layer: the layer, also of a group, which has no pixels. region: the part of the view that it
-    covers. pixels: its own pixels there. light: (rows, columns, 3) linear, what it shows where it
-    covers fully, over the visible layers below. coverage: (rows, columns), 0 to 1. opacity: the
-    rest of its strength, up to 1, that `light` does not include.
+    layer: the layer, also of a group, which has no pixels. effect: what it does, a gradient as
+    paint or as an adjustment, with the strength and importance of its group. region: the part of
+    the view that it covers. pixels: its own pixels there. light: (rows, columns, 3) linear, what it
+    shows where it covers fully, over the visible layers below. coverage: (rows, columns), 0 to 1.
+    opacity: the rest of its strength, up to 1, that `light` does not include.
     """
 
     layer: Layer
+    effect: Layer
     region: Region
     pixels: Pixels
     light: _Array
@@ -427,19 +429,18 @@ class ViewLayers:
             region = (top, top, 0, 0) if layer_pixels.is_empty(region) else region
             pixels = own.part(region)
             group = groups.get(layer.id if layer.group is None else layer.group)
-            strength, is_shown = layer.strength, layer.is_visible
+            effect, is_shown = effect_of(layer), layer.is_visible
             if group is not None and group is not layer:
-                strength = min(MAX_STRENGTH, strength * group.strength)
+                effect = effect.within(group)
                 is_shown &= group.is_visible
-            effective = replace(effect_of(layer), strength=strength)
             inner = layer_pixels.relative(region, part)
             shown, area = pixels, below.part(inner)
             if layer.gradient is not None:
                 shown = gradient_pixels(layer.gradient, pixels.importance, region, self.albedo)
-            light, coverage, opacity = _appearance(effective, shown, area.image)
-            yield LayerPicture(layer, region, pixels, light, coverage, opacity)
-            if is_shown and strength > 0 and not layer_pixels.is_empty(region):
-                below.image[slices(inner)] = compose_layer(effective, shown, area).image
+            light, coverage, opacity = _appearance(effect, shown, area.image)
+            yield LayerPicture(layer, effect, region, pixels, light, coverage, opacity)
+            if is_shown and effect.strength > 0 and not layer_pixels.is_empty(region):
+                below.image[slices(inner)] = compose_layer(effect, shown, area).image
 
 
 def _appearance(layer: Layer, pixels: Pixels, below: _Array) -> tuple[_Array, _Array, float]:

@@ -2,11 +2,13 @@
 
 The EXR holds the layers in numbers, so that nothing of them is lost, and is read back as it was.
 The OpenRaster shows what they look like: each layer as the light that it comes to, through the view
-transform of the painting; it is read back as layers of paint.
+transform of the painting; it is read back as layers of paint. A note at an adjustment says what it
+does, and holds while no program has changed or dropped it: then it is read back as an adjustment.
 """
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -26,12 +28,15 @@ from lightpaint.paint.layers.canvas import (
 )
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import is_empty, relative
-from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer, LayerStack
+from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, PAINTING_ID, Layer, LayerStack
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Text attribute of the EXR, and its format.
 KEY, FORMAT = "lightpaint.layers", "lightpaint-layers 1"
+
+#: Properties of an adjustment that its note in an OpenRaster file has.
+NOTED = ("gain", "tint", "strength", "importance")
 
 #: Name of the picture below all layers.
 LOOK_NAME = "Unpainted"
@@ -169,7 +174,29 @@ def _numbered(number: int, name: str, count: int) -> str:
 def _raster_layer(picture: LayerPicture, transform: ViewTransform) -> formats.RasterLayer:
     layer, (top, _, left, _) = picture.layer, picture.region
     display = np.concatenate([transform.encode(picture.light), picture.coverage[..., None]], -1)
-    return formats.RasterLayer(layer.name, display, (top, left), picture.opacity, layer.is_visible)
+    return formats.RasterLayer(
+        layer.name, display, (top, left), picture.opacity, layer.is_visible, _note(picture.effect)
+    )
+
+
+def _note(effect: Layer) -> str:
+    """Return what an adjustment does, as JSON; "" for other layers, which their picture shows."""
+    if effect.kind != "adjust":
+        return ""
+    factors = {k: v for k, v in effect.as_json().items() if k in NOTED}
+    return json.dumps({"format": FORMAT, "kind": effect.kind, **factors})
+
+
+def _noted(note: str) -> Layer:
+    """Return the adjustment of a note, with no name or place. Raises ImageError."""
+    try:
+        about = strict_json(note)
+        kind = about.pop("format"), about.pop("kind")
+        if kind != (FORMAT, "adjust") or not about.keys() <= set(NOTED):
+            raise ValueError(f"{kind} with {', '.join(about)}")
+        return read_record(Layer, {"id": PAINTING_ID, "kind": "adjust", **about})
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise ImageError(f"is damaged: the note of a layer: {ascii(error)[:200]}") from None
 
 
 def _shown_channels(
@@ -310,8 +337,10 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
         number = len(layers) + 1
         region, pixels = _raster_pixels(item, size, transform)
         if pixels.importance.any():
-            layers.append(_layer(number, item, group))
-            found.add(number, region, pixels)
+            layer = _layer(number, item, group)
+            image = np.zeros_like(pixels.image) if layer.is_mask else pixels.image
+            layers.append(layer)
+            found.add(number, region, pixels._replace(image=image))
 
     try:
         with formats.opened_openraster(path) as (file_size, items):
@@ -331,14 +360,10 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
 
 
 def _layer(number: int, item: formats.RasterLayer, group: int | None) -> Layer:
-    return Layer(
-        number,
-        "paint",
-        item.name[:MAX_NAME_LENGTH],
-        is_visible=item.is_visible,
-        strength=min(max(item.opacity, 0.0), 1.0),
-        group=group,
-    )
+    opacity = min(max(item.opacity, 0.0), 1.0)
+    layer = _noted(item.note) if item.note else Layer(number, "paint", strength=opacity)
+    name = item.name[:MAX_NAME_LENGTH]
+    return replace(layer, id=number, name=name, is_visible=item.is_visible, group=group)
 
 
 def _raster_pixels(

@@ -123,6 +123,14 @@ class Layer:
         """True if its pixels have no colour."""
         return self.kind in ("adjust", "weigh", "gradient")
 
+    def within(self, group: "Layer") -> "Layer":
+        """Return the layer with the strength and importance of its group included."""
+        return replace(
+            self,
+            strength=min(MAX_STRENGTH, self.strength * group.strength),
+            importance=min(MAX_FACTOR, self.importance * group.importance),
+        )
+
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Layer":
         """Return the layer that `as_json` wrote. Raises TypeError or ValueError otherwise."""
@@ -225,13 +233,9 @@ class LayerStack:
             group = None if layer.group is None else by_id[layer.group]
             if layer.kind == "group" or not (layer.is_visible and (not group or group.is_visible)):
                 continue
-            strength, importance = layer.strength, layer.importance
-            if group is not None:
-                strength = min(MAX_STRENGTH, strength * group.strength)
-                importance = min(MAX_FACTOR, importance * group.importance)
-            if strength > 0:
-                plain = replace(layer, name="", group=None)
-                shown.append(replace(plain, strength=strength, importance=importance))
+            effective = layer if group is None else layer.within(group)
+            if effective.strength > 0:
+                shown.append(replace(effective, name="", group=None))
         return tuple(shown)
 
     def change_to(self, after: "LayerStack") -> StackChange:
