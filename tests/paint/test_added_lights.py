@@ -157,8 +157,13 @@ def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> No
     assert opened_rig(moving).lights[-1].position == pytest.approx(position)
     moving.send(protocol.MoveLights({"point_2": {}}))
     assert np.array_equal(moving.plane("point_2"), old_plane)
+    moving.send(protocol.ConstrainLight(len(before), {"lock": [0.3, 0.2, 0.1]}))
+    moving.send(protocol.SaveLook("with"))
     moving.send(protocol.RemoveLight("point_2"))
     assert session.requests.placed == {}
+    moving.send(protocol.LoadLook(1))
+    assert names(moving) == (*before, "point_2")
+    moving.send(protocol.Undo())
     moving.send(protocol.Undo())
     assert names(moving) == (*before, "point_2")
 

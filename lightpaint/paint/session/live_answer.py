@@ -169,7 +169,7 @@ class LiveAnswer:
     def check(self, requests: SessionRequests) -> None:
         """Raise LightpaintError for impossible requests, before anything is changed."""
         lights, fit = self._lights_of(requests), self._fit(requests)
-        lighting.reduce_lights(self._unrequired(requests), lights, fit)
+        lighting.reduce_lights(self._unrequired(requests, lights), lights, fit)
         if lights.names == self._basis.names:
             self._find_wishes(requests)
 
@@ -223,12 +223,13 @@ class LiveAnswer:
         """Return all constraints, with what the wishes for planes require."""
         wishes = self._wishes_under(requests)
         required = None if wishes is None else wishes.requirements
-        return replace(self._unrequired(requests), requirements=required)
+        return replace(self._unrequired(requests, self._basis.lights), requirements=required)
 
-    def _unrequired(self, requests: SessionRequests) -> lighting.Constraints:
+    def _unrequired(self, requests: SessionRequests, lights: Lights) -> lighting.Constraints:
+        """Return all constraints but what wishes for planes require. lights: under the requests."""
         constraints = lighting.constraints_of(self._basis.requests).and_then(self._base_constraints)
         scaled = lighting.with_sure_scale if self._settings.planes is None else lighting.with_scale
-        return scaled(constraints.and_then(requests.constraints()), self._basis.lights)
+        return scaled(constraints.and_then(requests.constraints()), lights)
 
     def _wishes_under(self, requests: SessionRequests) -> WishesInEffect | None:
         """Return the wishes for planes under requests; None without any, and where limits of lamps
@@ -247,7 +248,7 @@ class LiveAnswer:
         if self._planes is None:
             return None
         if self._wishes is None or self._wishes[:2] != (requests, lights.names):
-            constraints = self._unrequired(requests)
+            constraints = self._unrequired(requests, lights)
             wishes = WishesInEffect.of(
                 self._planes.for_lights(lights),
                 lighting.reduce_lights(constraints, lights, self._fit(requests)),
