@@ -22,6 +22,7 @@ from lightpaint.basis.cache.denoised_planes import (
     cache_denoised_planes,
     read_denoised_planes,
 )
+from lightpaint.lighting import DEFAULT_HOLD
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
@@ -578,8 +579,12 @@ def test_a_preview_shows_what_the_change_does_then(
 
 @pytest.mark.nightly
 def test_letting_go_gradually_is_judged_on_the_whole_picture(client: StudioClient):
-    """What the button sets brings what it says, and changes the rest less than no hold does."""
-    client.paint(1, 1.2)
+    """What the button sets brings what it says, and changes the rest less than no hold does.
+
+    From a hold above the usual one, as a weaker one here changes the rest more than it gains.
+    """
+    client.studio.handle(protocol.ChangeSettings({"hold": 2 * DEFAULT_HOLD}), {})
+    client.paint(1, 1.2, (0, 15, 0, 10))
     answer = client.exact()
     advised = answer.fields["help"]
     assert advised is not None
