@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.display_text import short_repr, some_names
-from lightpaint.errors import ImageError
+from lightpaint.errors import ImageError, SizeError
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts
 from lightpaint.images.pixel_blocks import block_mean, check_factor
@@ -73,13 +73,17 @@ class Estimate:
         """Return the variance of each pixel of `image`, (h, w, 3), averaged over its neighbours.
 
         A pair of halves gives one squared difference per pixel, which is too rough to divide by. So
-        it is averaged over a window of (2 radius + 1)² pixels.
+        it is averaged over a window of (2 radius + 1)² pixels, which is clipped at the borders.
+        Raises SizeError for a negative radius.
         """
+        if radius < 0:
+            raise SizeError(f"radius is {radius}: expected a whole number of pixels >= 0")
         return box_mean(np.square(self.half_difference, dtype=np.float64), radius)
 
 
 def box_mean(values: Floats, radius: int) -> Floats:
     """Return means over a square window, which is clipped at the borders. values: (h, w, …)."""
+    radius = min(radius, max(values.shape[:2]))  # a larger window has the same pixels
     for axis in (0, 1):
         length = values.shape[axis]
         # Running sums, with 0 before them and the last one repeated after them.

@@ -303,8 +303,10 @@ class Problem(linear_problem.LinearProblem):
     def with_paintings(self, images: Sequence[Floats]) -> "Problem":
         """Return the problem of the same demands with other paintings of light, before a solve.
 
-        images: (h, w, 3) of each view.
+        images: (h, w, 3) of each view. Raises TargetError for another number of them.
         """
+        if len(images) != len(self.views):
+            raise TargetError(f"{len(images)} images for {len(self.views)} views: give one each")
         targets = zip(self.views.targets, images, strict=True)
         views = Views(self.views.bases, tuple(replace(x, image=image) for x, image in targets))
         squares, loss = _losses(views, self.basis, self.fit)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter
 
-from lightpaint.errors import ImageError
+from lightpaint.errors import ImageError, SizeError
 from lightpaint.images.estimate import Estimate, box_mean, read_estimate, write_estimate
 from lightpaint.images.formats.exr import write_rgb
 
@@ -68,6 +68,18 @@ def test_box_mean_agrees_with_scipy(seed: int, height: int, width: int, radius: 
     expected = uniform_filter(values, size, mode="constant") / counts
     # float64, and both sum up running.
     np.testing.assert_allclose(box_mean(values, radius), expected, rtol=1e-10)
+
+
+def test_a_window_beyond_the_picture_is_the_whole_picture():
+    rng = np.random.default_rng(0)
+    half = rng.standard_normal((3, 4, 3)).astype(np.float32)
+    estimate = Estimate(half, half)
+    mean = np.square(half, dtype=np.float64).mean(axis=(0, 1))
+    for radius in (4, 10**12):
+        found = estimate.variance(radius=radius)
+        np.testing.assert_allclose(found, np.broadcast_to(mean, (3, 4, 3)), rtol=1e-12)
+    with pytest.raises(SizeError, match="radius is -1: expected a whole number of pixels >= 0"):
+        estimate.variance(radius=-1)
 
 
 def test_box_mean_of_an_impulse():
