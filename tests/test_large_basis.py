@@ -93,8 +93,8 @@ def test_results_are_those_of_planes_in_memory(
         ]
         floats = ([x for x in some if isinstance(x, float)] for some in (actual, expected))
         # Sums of the same numbers by bands: round-off, of which solves make a little more, and
-        # differences of noisy blocks thrice as much.
-        np.testing.assert_allclose(*floats, rtol=3e-9 if grain == NOISY else 1e-9, atol=1e-11)
+        # differences of noisy blocks up to ten times as much.
+        np.testing.assert_allclose(*floats, rtol=1e-8 if grain == NOISY else 1e-9, atol=1e-11)
     ends = [(tmp_path / folder / "predicted.exr").read_bytes() for folder in ("file", "memory")]
     assert ends[0] == ends[1]
     sheets = [

@@ -70,6 +70,7 @@ def check_links(source: Path, results: Path) -> int:
     Sphinx prints dead links, and lists all of them in `output.json` of the folder `results`.
     """
     shutil.rmtree(results, ignore_errors=True)
+    (BUILD / "extra").mkdir(parents=True, exist_ok=True)  # schemas, to which no link is asked for
     code = _sphinx("linkcheck", source, results, results / "doctrees")
     if code == 0:
         lines = (results / "output.json").read_text(encoding="utf-8").splitlines()
