@@ -619,7 +619,10 @@ def test_the_number_of_a_deleted_look_does_not_return(moving: MovingStudio) -> N
 @pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudio) -> None:
-    """Up to the noise of 16 samples; unpainted parts are held near the look before the move."""
+    """Up to the noise of 16 samples, of which the two locked lights have others here and there.
+
+    Unpainted parts are held near the look before the move.
+    """
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.send(protocol.AddLight("point", position=(-0.3, 1.4, 0.4)))
     stroke(moving)
@@ -640,7 +643,7 @@ def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudi
     assert here.keys() == there.keys()
     assert here["bulb"] == pytest.approx([0.5, 0.6, 0.7])
     for name, emission in here.items():
-        assert there[name] == pytest.approx(emission, rel=3e-3, abs=1e-3), name
+        assert there[name] == pytest.approx(emission, rel=2e-2, abs=1e-3), name
 
 
 @pytest.mark.nightly
