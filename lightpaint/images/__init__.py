@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lightpaint.images.object_map import BACKGROUND, Objects
     from lightpaint.images.packed_picture import PackedPicture, pack_picture
     from lightpaint.images.picture import (
-        AT_LEAST, Picture, naming_file, picture_size, read_mask, read_picture,
+        AT_LEAST, Picture, picture_size, read_mask, read_picture,
     )
     from lightpaint.images.pixel_blocks import (
         BAND_PIXELS, LARGE_PICTURE, Size, bands_of, block_mean, block_pixels, block_sums, blocks_in,

@@ -79,16 +79,18 @@ def read_picture(
     layer: str | None = None,
     transform: ViewTransform | TransformChoice | None = None,
     otherwise: ViewTransform | None = None,
+    kind: str | None = None,
 ) -> Picture:
     """Return the picture in a file of any supported format.
 
     layer: layer, part or view of an EXR; required if it has several. transform: the view transform
     that encoded integers. Its open parts come from lightpaint's own text in a PNG, else from
-    `otherwise`, else from sRGB. Files of floats hold light and need no transform.
+    `otherwise`, else from sRGB. Files of floats hold light and need no transform. kind: the format,
+    which may be `webp` or `hdr`; by default one of a painting, by its first bytes.
     Raises ImageError, with one line that names the file, if it cannot be read.
     """
     path = Path(path)
-    kind = file_kind(path)
+    kind = kind or file_kind(path)
     try:
         if kind == "exr":
             parts = read_parts(path)

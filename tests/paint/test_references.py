@@ -10,7 +10,7 @@ import numpy as np
 import OpenEXR
 import OpenImageIO
 import pytest
-from PIL import Image
+from PIL import Image, ImageCms
 
 import lightpaint as lp
 from lightpaint.basis.lights import Lights
@@ -42,6 +42,9 @@ AREAS = ("whole", "regions", "parts", "pairs")
 
 #: Pairs of places that the two pictures have at the same place.
 PAIRS = (PlacePair((0.2, 0.2), (0.2, 0.2)), PlacePair((0.7, 0.6), (0.7, 0.6)))
+
+#: Number of EXIF's orientation.
+ORIENTATION = 0x112
 
 TRANSFORM = lp.ViewTransform()
 
@@ -377,6 +380,21 @@ def test_pictures_of_display_values_are_kept_as_they_are(tmp_path: Path, kind: s
     read = read_reference(tmp_path / "file", TRANSFORM)
     assert read.dtype == np.uint8
     np.testing.assert_allclose(read.astype(int), picture(), atol=6 if kind == "jpeg" else 1)
+
+
+def test_a_turned_and_transparent_webp_is_read_as_a_png_is(tmp_path: Path) -> None:
+    turned = Image.Exif()
+    turned[ORIENTATION] = 6
+    alpha = np.linspace(0, 255, picture().shape[1]).astype(np.uint8)
+    pixels = np.dstack([picture(), np.broadcast_to(alpha, picture().shape[:2])])
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    for kind, options in (("png", {}), ("webp", {"lossless": True, "exact": True})):
+        Image.fromarray(pixels).save(
+            tmp_path / kind, format=kind, exif=turned, icc_profile=profile, **options
+        )
+    png, webp = (read_reference(tmp_path / kind, TRANSFORM) for kind in ("png", "webp"))
+    assert webp.shape == (40, 24, 3)
+    np.testing.assert_array_equal(webp, png)
 
 
 def test_a_large_picture_is_reduced(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     # fmt: off
-    from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, light_of_integers
+    from lightpaint.images.formats.bitmap import Bitmap
     from lightpaint.images.formats.exr import (
         OWN_PREFIX, Channels, ExrPart, compression_errors, read_channels, read_headers, read_parts,
         rgb_channels, write_parts, write_rgb,

@@ -1,4 +1,5 @@
-"""PNG, TIFF, JPEG and PSD: the stored numbers of a picture, and the linear light that they mean.
+"""The stored numbers of a picture, and the linear light that they mean: of PNG, TIFF, JPEG, PSD,
+WebP and Radiance HDR.
 
 OpenImageIO decodes them with the formats' own libraries. Files that declare more than MAX_PIXELS,
 or that it would misread (CMYK, Lab, several pages, Photoshop files without a merged picture), are
@@ -63,11 +64,11 @@ TURNED = (5, 6, 7, 8)
 class Bitmap:
     """A picture as stored numbers.
 
-    kind: `png`, `tiff`, `jpeg` or `psd`. values: (h, w, 3) uint8, uint16, float16 or float32; grey
-    is repeated. alpha: (h, w) of the same type; None if absent or opaque everywhere. premultiplied:
-    whether `values` are multiplied by alpha. codes: largest possible integer; None for floats.
-    profile: meaning of the numbers; None for sRGB. lossy: whether compression changed them. shown:
-    the view transform declared in the file, as `name stops`.
+    kind: `png`, `tiff`, `jpeg`, `psd`, `webp` or `hdr`. values: (h, w, 3) uint8, uint16, float16 or
+    float32; grey is repeated. alpha: (h, w) of the same type; None if absent or opaque everywhere.
+    premultiplied: whether `values` are multiplied by alpha. codes: largest possible integer; None
+    for floats. profile: meaning of the numbers; None for sRGB. lossy: whether compression changed
+    them. shown: the view transform declared in the file, as `name stops`.
     """
 
     kind: str

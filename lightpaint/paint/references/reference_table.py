@@ -13,10 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour import ViewTransform, choose_exposure, read_icc
+from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.files import first_line, one_line
-from lightpaint.images import formats, naming_file, read_picture, resampled
+from lightpaint.images import formats, read_picture, resampled
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
 from lightpaint.paint.store.session_file import Store
@@ -28,6 +27,9 @@ MAX_SIDE = 1280
 #: Largest light of a reference that is kept, where display white is 1.
 MAX_LIGHT = 1000.0
 
+#: Formats of references that no painting has, by the first bytes of a file.
+FURTHER_KINDS = {b"#?": "hdr", b"RIFF": "webp"}
+
 #: Display values (h, w, 3) uint8; of files of light, light float16, whose display white is 1.
 ReferencePixels = npt.NDArray[Any]
 
@@ -36,24 +38,20 @@ MAX_REFERENCES, MAX_NAME_LENGTH = 12, 60
 
 
 def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
-    """Return the picture in a file, at most MAX_SIDE pixels long.
+    """Return the picture in a file, over black, at most MAX_SIDE pixels long.
 
     transform: by which the session shows light. Raises ImageError, in one line that names the file.
     """
-    head = formats.head_of(path, 16)
-    is_light = False
-    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
-        with naming_file(path):
-            light = formats.light_of_integers(_webp(path), None, transform)
-    elif head.startswith(b"#?"):
-        with naming_file(path):
-            light, is_light = _radiance(path), True
-    else:
-        light, is_light = _light_of_painting(path, transform)
-    light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
+    head = formats.head_of(path, 4)
+    kind = next((kind for mark, kind in FURTHER_KINDS.items() if head.startswith(mark)), None)
+    picture = read_picture(path, transform=transform, kind=kind)
+    light = picture.image
+    if picture.alpha is not None:
+        light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    light = np.maximum(_reduced(light), 0)
     if not light.any():
         raise ImageError(path, " is black: choose a picture with light in it")
-    if not is_light:
+    if picture.codes is not None:
         return np.asarray(np.round(255 * transform.encode(light)), np.uint8)
     exposed = light * 2.0 ** choose_exposure(light)
     return np.asarray(np.minimum(exposed, MAX_LIGHT), np.float16)
@@ -65,65 +63,6 @@ def _reduced(light: Floats) -> Floats:
     if factor >= 1:
         return light
     return resampled(light, (max(1, round(height * factor)), max(1, round(width * factor))))
-
-
-def _light_of_painting(path: Path, transform: ViewTransform) -> tuple[Floats, bool]:
-    """Return the light (h, w, 3) in a file of a kind that paintings have, and whether it holds
-    light.
-    """
-    picture = read_picture(path, transform=transform)
-    light = picture.image
-    if picture.alpha is not None:
-        light = light * np.clip(picture.alpha, 0, 1)[..., None]
-    return light, picture.codes is None
-
-
-def _webp(path: Path) -> formats.Bitmap:
-    """Return the picture in a WebP file over black. Raises ImageError, without naming the file."""
-    from PIL import Image, ImageOps
-
-    try:
-        with formats.without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
-            _check_size(file.size)
-            profile = file.info.get("icc_profile")
-            upright = ImageOps.exif_transpose(file).convert("RGBA")
-        values = np.asarray(upright)
-    except (OSError, EOFError, LookupError, SyntaxError, ValueError, Image.DecompressionBombError):
-        raise ImageError("is damaged or cut off: export it again") from None
-    alpha = values[..., 3:].astype(np.float32) / 255
-    display = np.round(values[..., :3] * alpha).astype(np.uint8)
-    icc = None if profile is None else read_icc(profile)
-    return formats.Bitmap("webp", display, None, False, 255, icc, lossy=True)
-
-
-def _radiance(path: Path) -> Floats:
-    """Return the light in a Radiance HDR file, (h, w, 3). Raises ImageError, without naming it."""
-    import OpenImageIO
-
-    with formats.silenced():
-        OpenImageIO.geterror()
-        file = OpenImageIO.ImageInput.open(str(path))
-        if file is None:
-            reason = one_line(first_line(OpenImageIO.geterror(), path=path))
-            raise ImageError(f"is damaged: {reason}")
-        try:
-            spec = file.spec()
-            _check_size((spec.width, spec.height))
-            pixels = file.read_image(0, 0, 0, 3, "float") if spec.nchannels == 3 else None
-            if pixels is None or file.geterror():
-                raise ImageError("is damaged or cut off: export it again")
-        finally:
-            file.close()
-    return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, 3)
-
-
-def _check_size(size: tuple[int, int]) -> None:
-    width, height = size
-    if min(size) < 1 or width * height > formats.MAX_PIXELS:
-        raise ImageError(
-            f"declares {width}x{height} pixels: expected at most "
-            f"{formats.MAX_PIXELS / 1e6:.0f} million"
-        )
 
 
 @dataclass(frozen=True, eq=False)
