@@ -13,7 +13,7 @@ from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
 from lightpaint.basis import Basis
 from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
-from lightpaint.images import Objects, block_mean, fitting_factor
+from lightpaint.images import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
@@ -342,17 +342,6 @@ def _area(areas: ViewAreas, name: Area) -> Mask:
     return {"whole": areas.whole, "lit": areas.lit, "subject": areas.subject}[name]
 
 
-def check_subject(canvases: Sequence[Canvas], subject: str | None) -> None:
-    """Raise PaintError for an object that no view sees."""
-    if subject is None:
-        return
-    for canvas in canvases:
-        objects = canvas.basis.objects
-        if objects is not None and subject in objects.names:
-            return
-    raise PaintError(f"no view sees an object called {subject!r:.40}")
-
-
 def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tuple[int, Region]]:
     """Put the layers of the preset of a name on top, as an open change; return what changes.
 
@@ -360,30 +349,29 @@ def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tupl
     PaintError for an unknown preset, and for an object that no view sees.
     """
     preset = find_preset(name)
-    check_subject(list(canvases), subject)
+    view = _view_of(canvases, subject)
     title = preset.title if subject is None else f"{preset.title}: {subject}"
-    found = find_layers(preset, _view_of(canvases, subject), subject)
+    found = find_layers(preset, view, subject)
     layers = found.layers(canvases.next_layer, title[:MAX_NAME_LENGTH])
     masks = {
-        k: [mask * selected_mask(canvas) for mask in found.masks(canvas, _areas(canvas, found))]
+        k: [mask * selected_mask(canvas) for mask in found.masks(canvas, areas)]
         for k, canvas in enumerate(canvases)
+        for areas in [ViewAreas.of_view(canvas.basis, canvas.current, chosen=found.subject)]
     }
     return open_group(canvases, layers, masks)
 
 
 def _view_of(canvases: Canvases, subject: str | None) -> Canvas:
-    """Return the first view that sees an object, or the first."""
-    for canvas in canvases:
-        objects = canvas.basis.objects
-        if objects is not None and subject in objects.names and objects.mask(subject).any():
-            return canvas
-    return canvases[0]
-
-
-def _areas(canvas: Canvas, found: PresetLayers) -> ViewAreas:
-    basis = canvas.basis
-    look, objects = canvas.current, basis.objects
-    return ViewAreas(look, basis.emitters_seen, basis.features, objects, found.subject)
+    """Return the first view that sees an object, or the first. Raises PaintError if none knows
+    it.
+    """
+    if subject is None:
+        return canvases[0]
+    maps = [(canvas, canvas.basis.objects) for canvas in canvases]
+    known = [(canvas, x) for canvas, x in maps if x is not None and subject in x.names]
+    if not known:
+        raise PaintError(f"no view sees an object called {subject!r:.40}")
+    return next((canvas for canvas, x in known if x.mask(subject).any()), canvases[0])
 
 
 def open_group(
@@ -430,18 +418,18 @@ def reduced_areas(
     side: approximate pixels of its longer side.
     """
     factor = reduction(canvas, side)
-    basis = canvas.basis
     look = np.asarray(block_mean(light, factor), np.float32)
-    height, width = look.shape[:2]
-    sample = slice(0, factor * height, factor), slice(0, factor * width, factor)
-    features, objects = basis.features, basis.objects
-    return look, ViewAreas(
-        look,
-        basis.emitters_seen[sample],
-        None if features is None else features.reduced(factor),
-        None if objects is None else Objects(objects.index[sample], objects.names),
-        subject,
-    )
+    return look, ViewAreas.of_view(canvas.basis, look, factor, subject)
+
+
+def with_layers(look: Floats, layers: Sequence[Layer], masks: Sequence[Mask]) -> Floats:
+    """Return a picture (h, w, 3) linear under adjustments with these masks (h, w), the lowest
+    first.
+    """
+    pixels, no_colour = Pixels.unpainted(look), np.zeros_like(look)
+    for layer, mask in zip(layers, masks, strict=True):
+        pixels = compose_layer(layer, Pixels(no_colour, mask), pixels)
+    return pixels.image
 
 
 def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
@@ -451,8 +439,5 @@ def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
     """
     found = find_layers(preset, canvas, None)
     look, areas = reduced_areas(canvas, canvas.current, side, found.subject)
-    pixels = Pixels.unpainted(look)
     masks = found.masks(canvas, areas, reduction(canvas, side))
-    for layer, mask in zip(found.layers(1, "")[:-1], masks, strict=True):
-        pixels = compose_layer(layer, Pixels(np.zeros_like(look), mask), pixels)
-    return pixels.image
+    return with_layers(look, found.layers(1, "")[:-1], masks)

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from PIL import Image, ImageFilter
 
 from lightpaint.arrays import Bools, Floats
+from lightpaint.basis import Basis
 from lightpaint.colour import luminance
 from lightpaint.images import Features, Objects
 
@@ -56,6 +57,25 @@ class ViewAreas:
     ) -> None:
         self._look, self._emitters_seen = look, emitters_seen
         self._features, self._objects, self._chosen = features, objects, chosen
+
+    @classmethod
+    def of_view(
+        cls, basis: Basis, look: Floats, factor: int = 1, chosen: str | None = None
+    ) -> "ViewAreas":
+        """Return the areas of a view, reduced.
+
+        look: (h, w, 3) linear, already reduced. factor: side of the blocks of pixels that one pixel
+        of it stands for.
+        """
+        features, objects = basis.features, basis.objects
+        sample = tuple(slice(0, factor * side, factor) for side in look.shape[:2])
+        return cls(
+            look,
+            basis.emitters_seen[sample],
+            None if features is None else features.reduced(factor),
+            None if objects is None else Objects(objects.index[sample], objects.names),
+            chosen,
+        )
 
     @property
     def whole(self) -> Mask:

@@ -4,7 +4,6 @@ changes of brightness and colour that make a picture look like it.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -186,14 +185,6 @@ class AreaChange:
         return Layer(number, "adjust", self.area.name, group=group, gain=gain, tint=tint)
 
 
-def _band(number: int, tones: Tones) -> Weights:
-    return tones.bands[number]
-
-
-def _view_band(number: int, view: ViewAreas) -> Mask:
-    return view.bands[number]
-
-
 WHOLE_AREA = LightArea(
     "Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False
 )
@@ -203,10 +194,12 @@ TONE_AREAS = (
     LightArea("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
 )
 
-BAND_AREAS = tuple(
-    LightArea(name, partial(_band, k), partial(_view_band, k))
-    for k, name in enumerate(("Top", "Middle", "Bottom"))
-)
+
+def _band_area(number: int, name: str) -> LightArea:
+    return LightArea(name, lambda tones: tones.bands[number], lambda view: view.bands[number])
+
+
+BAND_AREAS = tuple(_band_area(k, name) for k, name in enumerate(("Top", "Middle", "Bottom")))
 
 
 def of_another_place(areas: Sequence[LightArea], max_stops: float) -> tuple[LightArea, ...]:
@@ -217,14 +210,17 @@ def of_another_place(areas: Sequence[LightArea], max_stops: float) -> tuple[Ligh
     return tuple(replace(area, has_color=False, max_stops=max_stops) for area in areas)
 
 
-def spot_area(name: str, there: Point, here: Point, seen: float, changed: float) -> LightArea:
-    """Return a soft spot. there, here: its middle (x, y) in the reference and in the picture, from
-    0 to 1. seen, changed: radius that is compared, and changed, in longer sides.
+def spot_area(
+    name: str, there: Point, here: Point, seen: float, changed: float, in_view: Point | None = None
+) -> LightArea:
+    """Return a soft spot. there, here: its middle (x, y) in the reference and in the part of the
+    picture that is compared, from 0 to 1. seen, changed: radius that is compared, and changed, in
+    longer sides. in_view: its middle in the whole picture, if that is another place.
     """
     return LightArea(
         name,
         lambda tones: tones.around(*here, seen),
-        lambda view: view.around(*here, changed),
+        lambda view: view.around(*(in_view or here), changed),
         seen_there=lambda tones: tones.around(*there, seen),
     )
 
@@ -236,19 +232,11 @@ PART_AREAS = tuple(
 
 def part_areas(part: ViewPart) -> tuple[LightArea, ...]:
     """Return the nine parts of a reference, at the places of a view that it shows."""
-    scale = PART_RADIUS * max(part.width, part.height)
-    return tuple(_placed(name, place, part, scale) for name, place in PARTS.items())
-
-
-def _placed(name: str, there: Point, part: ViewPart, changed: float) -> LightArea:
-    across, down = there
-    here = (1 - across if part.is_mirrored else across, down)
-    in_view = part.place(across, down)
-    return LightArea(
-        name,
-        lambda tones: tones.around(*here, PART_RADIUS),
-        lambda view: view.around(*in_view, changed),
-        seen_there=lambda tones: tones.around(*there, PART_RADIUS),
+    changed = PART_RADIUS * max(part.width, part.height)
+    places = [(name, x, 1 - x if part.is_mirrored else x, y) for name, (x, y) in PARTS.items()]
+    return tuple(
+        spot_area(name, (x, y), (here, y), PART_RADIUS, changed, part.place(x, y))
+        for name, x, here, y in places
     )
 
 
@@ -371,29 +359,26 @@ def _open_likeness(
         canvas, canvas.image, reference_light.FINDING_SIDE
     )
     layers: list[Layer] = []
-    makers: list[Callable[[Canvas, ViewAreas], Mask]] = []
-    asked = light
+    found, asked = None, light
     if request.areas in ("whole", "regions") and part is None:
         found = reference_light.find_light(
             canvas, reference, light, areas, matches_brightness=request.matches_brightness
         )
         if found is not None:
             layers += found.layers
-            makers += [partial(_light_mask, found, k) for k in range(len(found.layers))]
             asked = found.image
             if found.strength < 1:
                 share = f", {round(100 * found.strength)} %"
                 name = name[: MAX_NAME_LENGTH - len(share)] + share
     changes = _changes(canvas, request, reference, asked, areas, part, has_layers=bool(layers))
     layers += [change.layer(1, 1) for change in changes]
-    makers += [partial(_area_mask, change.area) for change in changes]
     if not layers:
         raise PaintError(f"{name}: the picture has that light already")
     first = canvases.next_layer
     group = first + len(layers)
     numbered = [replace(x, id=first + k, group=group) for k, x in enumerate(layers)]
     views = [view] if request.areas == "pairs" else range(len(canvases))
-    masks = {k: _masks(canvases[k], makers) for k in views}
+    masks = {k: _masks(canvases[k], found, changes) for k in views}
     return lighting_presets.open_group(
         canvases, [*numbered, Layer(group, "group", name)], masks
     ), name
@@ -449,22 +434,15 @@ def _view_shown(canvases: Canvases, first: int, reference: Tones) -> tuple[int, 
     return best
 
 
-def _light_mask(
-    found: reference_light.LightLayers, number: int, canvas: Canvas, areas: ViewAreas
-) -> Mask:
-    return found.mask(canvas, areas, number)
-
-
-def _area_mask(area: LightArea, canvas: Canvas, areas: ViewAreas) -> Mask:
-    return area.mask(areas)
-
-
-def _masks(canvas: Canvas, makers: Sequence[Callable[[Canvas, ViewAreas], Mask]]) -> list[Mask]:
-    """Return masks in a view, within what is selected."""
-    basis = canvas.basis
-    found = ViewAreas(canvas.image, basis.emitters_seen, basis.features, basis.objects)
+def _masks(
+    canvas: Canvas, found: reference_light.LightLayers | None, changes: Sequence[AreaChange]
+) -> list[Mask]:
+    """Return the masks of the layers of a request in a view, within what is selected."""
+    areas = ViewAreas.of_view(canvas.basis, canvas.image)
+    masks = [] if found is None else found.masks(canvas.basis, areas)
+    masks += [change.area.mask(areas) for change in changes]
     selected = lighting_presets.selected_mask(canvas)
-    return [maker(canvas, found) * selected for maker in makers]
+    return [mask * selected for mask in masks]
 
 
 def compared_areas(

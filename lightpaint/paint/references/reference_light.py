@@ -13,13 +13,11 @@ from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets import lighting_presets
 from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
 from lightpaint.paint.references.tones import LightTones, Tones
-from lightpaint.paint.store.history_steps import Pixels
 
 #: Stops of a picture's contrast that are of its surfaces, and the least contrast of light.
 SURFACE_STOPS, LEAST_STOPS = 0.7, 0.05
@@ -273,13 +271,12 @@ class LightLayers:
     image: Floats
     strength: float
 
-    def mask(self, canvas: Canvas, areas: ViewAreas, number: int) -> Mask:
-        """Return the mask (h, w) of one of the layers in a view."""
-        if number == 0:
-            return areas.whole
-        shares = [_share(canvas.basis, group.lamps, areas) for group in self.groups]
+    def masks(self, basis: Basis, areas: ViewAreas) -> list[Mask]:
+        """Return the mask (h, w) of each layer in a view."""
+        shares = [_share(basis, group.lamps, areas) for group in self.groups]
+        usable = areas.whole
         masks = lighting_presets.masks_of(self.groups, self.fill, shares)
-        return np.asarray(masks[number - 1] * areas.whole, np.float32)
+        return [usable, *(x * usable for x in masks)]
 
 
 def find_light(
@@ -405,21 +402,17 @@ def _layers(
         level = 0.0
     elif level is None:
         level = _steady_stops(roles, (*groups, fill)) - stops_darker(reference, picture)
+    gain = 2.0**level
     fill, *groups = (
-        lighting_presets.LampGroup(
-            x.name, roles.lights(x.lamps), x.gain * 2.0**level, gains_of(x.tint)
-        )
+        replace(x, lamps=roles.lights(x.lamps), gain=gain * x.gain, tint=gains_of(x.tint))
         for x in (fill, *groups)
     )
     layers = lighting_presets.layers_of(groups, fill, 1, "")[:-1]
     factor = lighting_presets.reduction(canvas, FINDING_SIDE)
     shares = [_share(canvas.basis, x.lamps, areas, factor) for x in groups]
-    pixels = Pixels.unpainted(np.asarray(light, np.float32))
-    for layer, mask in zip(
-        layers, [areas.whole, *lighting_presets.masks_of(groups, fill, shares)], strict=True
-    ):
-        pixels = compose_layer(layer, Pixels(np.zeros_like(light), mask), pixels)
-    return LightLayers(tuple(groups), fill, layers, pixels.image, 1.0)
+    masks = [areas.whole, *lighting_presets.masks_of(groups, fill, shares)]
+    image = lighting_presets.with_layers(np.asarray(light, np.float32), layers, masks)
+    return LightLayers(tuple(groups), fill, layers, image, 1.0)
 
 
 def _balance(roles: LampRoles, keys: Sequence[Bools]) -> list[float]:
@@ -458,8 +451,5 @@ def _log2(value: float) -> float:
 
 def _share(basis: Basis, lamps: Bools, areas: ViewAreas, factor: int = 1) -> Mask:
     """Return the share (h, w) of the light that comes from lamps; lit parts for all or none."""
-    return (
-        light_share(basis, lamps, factor)
-        if lighting_presets.is_divided(basis, lamps)
-        else areas.lit
-    )
+    is_divided = lighting_presets.is_divided(basis, lamps)
+    return light_share(basis, lamps, factor) if is_divided else areas.lit
