@@ -10,13 +10,14 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting import Lighting
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.layers.canvas import ViewLayers
-from lightpaint.paint.protocol import Message, PictureUpdate, ProgressReport
+from lightpaint.paint.protocol import Message, ProgressReport
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.progress import Progress
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
@@ -219,13 +220,8 @@ class Publisher:
         return messages
 
     def publish_picture(self, name: str, picture: Picture) -> None:
-        """Store a picture and tell the page that there is a new one."""
-
-        def renewed() -> Message:
-            self.pictures.put(name, picture)
-            return PictureUpdate(resources={name: self.pictures.generations[name]})
-
-        self.publish_made(renewed)
+        """Store a picture and announce it to the page."""
+        self.publish_made(lambda: self.pictures.put_all({name: picture}))
 
     def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Report how far a task is. Raises StoppedError once the session has ended."""
@@ -234,6 +230,20 @@ class Publisher:
         self.last_progress = report = ProgressReport(task=label, done=done, total=total, unit=unit)
         with MITSUBA.aside():  # the receiver may wait for a render of its own
             self.publish(report)
+
+    def reporter(
+        self, check: Callable[[], None], task: str | None = None, steps: str | None = None
+    ) -> Progress:
+        """Return a listener that calls `check`, which raises to stop, and reports progress.
+
+        task, steps: the label and the unit in the place of those that the work gives.
+        """
+
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+            check()
+            self.report_progress(task or label, done, total, steps or unit)
+
+        return report
 
 
 class StudioLinks(NamedTuple):

@@ -54,9 +54,9 @@ def new_emitter(name: str, values: Mapping[str, Any]) -> NewEmitter:
 def values_of(emitter: NewEmitter) -> dict[str, Any]:
     """Return a new light in the form of a session's requests."""
     site = emitter.site
-    values: dict[str, Any] = {"kind": emitter.kind, "position": _listed(emitter.pose.position)}
+    values: dict[str, Any] = {"kind": emitter.kind, "position": listed(emitter.pose.position)}
     if emitter.pose.target is not None:
-        values["target"] = _listed(emitter.pose.target)
+        values["target"] = listed(emitter.pose.target)
     if site.cutoff is not None:
         values |= {"cutoff": site.cutoff, "beam": site.beam}
     if emitter.size is not None:
@@ -101,9 +101,9 @@ def hung_before(
 
 def hung_at(name: str, kind: str, place: Doubles, direction: Doubles, extent: float) -> NewEmitter:
     """Return a new light at a place, which points in a direction."""
-    values: dict[str, Any] = {"kind": kind, "position": _listed(place)}
+    values: dict[str, Any] = {"kind": kind, "position": listed(place)}
     if kind != "point":
-        values["target"] = _listed(place + 0.25 * extent * direction)
+        values["target"] = listed(place + 0.25 * extent * direction)
     if kind == "spot":
         values |= {"cutoff": CUTOFF, "beam": BEAM}
     if kind == "panel":
@@ -123,6 +123,6 @@ def with_level(emitter: NewEmitter, alone: float, current: float) -> NewEmitter:
     return replace(emitter, emission=emission)
 
 
-def _listed(point: Doubles | Position | None) -> list[float]:
-    """Return a point for JSON, rounded to single precision."""
+def listed(point: Doubles | Position | None) -> list[float]:
+    """Return a point as JSON has it, without the noise of single precision."""
     return [float(f"{x:.6g}") for x in np.asarray(point, dtype=float)]

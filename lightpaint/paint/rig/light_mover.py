@@ -18,7 +18,14 @@ from lightpaint.errors import LightpaintError, PaintError, SceneError
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.rig.added_lights import free_name, hung_at, hung_before, values_of, with_level
+from lightpaint.paint.rig.added_lights import (
+    free_name,
+    hung_at,
+    hung_before,
+    listed,
+    values_of,
+    with_level,
+)
 from lightpaint.paint.rig.lamp_rig import LampRig, RigView
 from lightpaint.paint.rig.page_geometry import (
     FirstHit,
@@ -245,8 +252,7 @@ class LightMover:
                     full = name_in_view(plain, view.view)
                     pictures.offer(full, maker)
                     offered.append(full)
-        resources = {name: pictures.generations[name] for name in offered}
-        return protocol.PictureUpdate(resources=resources)
+        return pictures.announcement(offered)
 
     def _dragged_planes(self, session: Session, number: int) -> list[protocol.DraggedPlane]:
         """Return the pictures of dragged lights in a view."""
@@ -261,7 +267,7 @@ class LightMover:
                 unmoved = session.bases[number]
                 plane = picture_table.page_plane(basis.planes.plane(k), unmoved)[::step, ::step]
                 picture = as_halves(plane, picture_table.plane_scale(unmoved, k))
-            resources = {name: pictures.generations[name] for name in names}
+            resources = pictures.announcement(names).resources
             messages.append(
                 protocol.DraggedPlane(
                     light=k, view=number, step=step, resources=resources, data=picture
@@ -298,12 +304,10 @@ class LightMover:
         """Put the denoised picture of a plane of `basis`, unless the view has other planes now."""
         if view.basis.planes is not basis.planes:
             return None
-        table, resources = self._publisher.pictures, {}
-        for name, new_picture in ((f"clean/{k}", picture), (f"thumb/{k}", thumbnail)):
-            full = name_in_view(name, view.view)
-            table.put(full, new_picture)
-            resources[full] = table.generations[full]
-        return protocol.PictureUpdate(resources=resources)
+        pictures = {f"clean/{k}": picture, f"thumb/{k}": thumbnail}
+        return self._publisher.pictures.put_all(
+            {name_in_view(name, view.view): x for name, x in pictures.items()}
+        )
 
 
 def _unlit_warnings(session: Session, names: Collection[str]) -> list[protocol.Notice]:
@@ -329,7 +333,7 @@ def _aimed(name: str, site: Site, hit: FirstHit) -> PoseChange:
         raise PaintError(f"{name} shines all around: it cannot be aimed")
     if site.position is None:
         raise PaintError(f"{name} is infinitely far away: choose where its shadow ends instead")
-    return {"target": _listed(hit.point)}
+    return {"target": listed(hit.point)}
 
 
 def _with_highlight(name: str, site: Site, hit: FirstHit, free_length: FreeLength) -> PoseChange:
@@ -370,7 +374,7 @@ def _hung(
     if site.position is None:
         if site.direction is None:
             raise PaintError(f"{name} has no place and no direction: it cannot be moved")
-        return {"target": _listed(-way)}
+        return {"target": listed(-way)}
     distance = float(np.linalg.norm(np.array(site.position) - lit))
     current_distance = float(np.linalg.norm(start - lit))
     distance_needed = max(distance - current_distance, BEYOND_EDGE * distance)
@@ -379,19 +383,14 @@ def _hung(
     if room < LEAST_ROOM * distance:
         raise PaintError(f"there is no room for {name} on that line: choose another place")
     place = start + min(distance_needed, room) * way
-    pose: PoseChange = {"position": _listed(place)}
+    pose: PoseChange = {"position": listed(place)}
     if site.direction is not None:
-        pose["target"] = _listed(lit)
+        pose["target"] = listed(lit)
     return pose
 
 
 def _unit(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-30))
-
-
-def _listed(point: Doubles) -> list[float]:
-    """Return a point as JSON has it, without the noise of single precision."""
-    return [float(f"{x:.6g}") for x in point]
 
 
 def pose_change(

@@ -10,7 +10,7 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import StoppedError
-from lightpaint.paint.rig.added_lights import free_name, values_of
+from lightpaint.paint.rig.added_lights import free_name, listed, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_looks import of_moved_scenes
 from lightpaint.paint.session.moved_lights import Placed
@@ -298,12 +298,6 @@ class LightPlacer:
         self, request: protocol.PlaceLights, snapshot: SessionSnapshot, check: Callable[[], None]
     ) -> tuple[Solution, Placement]:
         """Return the exact answer of the paintings, and the result of the search."""
-
-        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            del label, unit
-            check()
-            self._publisher.report_progress("place", done, total, "steps")
-
         last_s = 0.0
 
         def watch(sites: Mapping[str, Site]) -> None:
@@ -335,7 +329,7 @@ class LightPlacer:
             solution,
             freedoms,
             new=new,
-            progress=report,
+            progress=self._publisher.reporter(check, "place", "steps"),
             watch=watch,
             is_enough=lambda: self._ended_request is request,
         )
@@ -378,5 +372,5 @@ def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:
     for key in ("position", "target", "cutoff", "beam"):
         value = getattr(pose, key)
         if value is not None:
-            values[key] = [float(f"{x:.6g}") for x in value] if isinstance(value, tuple) else value
+            values[key] = listed(value) if isinstance(value, tuple) else value
     return values

@@ -166,11 +166,8 @@ class LookComparison:
         """Offer pictures, unless other looks are compared by now."""
         if self._looks is not looks:
             return None
-        table = self._publisher.pictures
-        for name, picture in pictures.items():
-            table.put(name, picture)
         self._offered |= {*pictures}
-        return PictureUpdate(resources={name: table.generations[name] for name in pictures})
+        return self._publisher.pictures.put_all(pictures)
 
 
 def _pictures(basis: Basis, look: LookLighting, unmoved: Basis) -> dict[str, Picture]:

@@ -52,8 +52,9 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     if np.allclose(direction, direction[0], atol=1e-5):
         x_axis, y_axis, forward = origin[1] - origin[0], origin[2] - origin[0], direction[0]
         expected = origin[0] + 0.7 * x_axis + 0.6 * y_axis
-        is_straight = np.linalg.norm(expected - origin[4]) <= STRAIGHT * np.linalg.norm(x_axis)
-        return _camera(scene, origin[0], x_axis, y_axis, forward, is_parallel=True, ok=is_straight)
+        if np.linalg.norm(expected - origin[4]) > STRAIGHT * np.linalg.norm(x_axis):
+            return None
+        return _camera(scene, origin[0], x_axis, y_axis, forward, is_parallel=True)
     eye = _crossing(origin, direction)
     off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
     if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
@@ -70,8 +71,9 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     )
     expected = direction[0] + 0.7 * x_axis + 0.6 * y_axis
     off_ray = np.linalg.norm(np.cross(expected, direction[4])) / np.linalg.norm(expected)
-    is_straight = bool(lengths.min() > 0 and off_ray <= STRAIGHT)
-    return _camera(scene, eye, x_axis, y_axis, direction[0], is_parallel=False, ok=is_straight)
+    if lengths.min() <= 0 or off_ray > STRAIGHT:
+        return None
+    return _camera(scene, eye, x_axis, y_axis, direction[0], is_parallel=False)
 
 
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
@@ -91,11 +93,8 @@ def _camera(
     forward: Doubles,
     *,
     is_parallel: bool,
-    ok: bool,
-) -> Camera | None:
+) -> Camera:
     height, width = scene.size
-    if not ok:
-        return None
     return Camera(
         origin=_listed(origin),
         x_axis=_listed(x_axis / width),
@@ -252,19 +251,15 @@ def mesh_parts(vertices: Doubles, faces: npt.NDArray[np.int_]) -> npt.NDArray[np
 
     vertices: (n, 3); those at one place count as one. faces: (m, 3), indices of their corners.
     """
-    place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    corners = place[faces]
-    part_of = np.arange(place.max(initial=-1) + 1)
-    while True:
-        smallest = part_of[corners].min(axis=1)
-        joined = part_of.copy()
-        np.minimum.at(joined, corners, smallest[:, None])
-        # What a face joins is joined for all that was one part with its corners before.
-        np.minimum.at(joined, part_of[corners], smallest[:, None])
-        joined = joined[joined]
-        if (joined == part_of).all():
-            return np.asarray(part_of[place])
-        part_of = joined
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    places, place = np.unique(vertices, axis=0, return_inverse=True)
+    place, count = place.reshape(-1), len(places)
+    first, second, third = place[faces].T
+    edges = np.concatenate([first, first]), np.concatenate([second, third])
+    graph = coo_array((np.ones(len(edges[0]), bool), edges), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1][place])
 
 
 def _surface_points(shape: Any) -> Doubles:
@@ -299,9 +294,5 @@ def sky_axes(scene: Scene) -> tuple[SkyAxes, ...]:
         props, to_world = scene.parsed.state.nodes[emitter.node].props, np.eye(3)
         if "to_world" in props:
             to_world = np.array(props["to_world"].matrix, float).reshape(4, 4)[:3, :3]
-        axes[texel.image] = SkyAxes(texel.image, _matrix_rows(np.linalg.inv(to_world)))
+        axes[texel.image] = SkyAxes(texel.image, tuple(map(_listed, np.linalg.inv(to_world))))
     return tuple(axes.values())
-
-
-def _matrix_rows(matrix: npt.NDArray[np.floating]) -> tuple[Place, ...]:
-    return tuple(tuple(map(float, row)) for row in matrix)

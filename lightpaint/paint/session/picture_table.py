@@ -3,7 +3,7 @@
 Planes are reduced where a page could not hold them whole.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import block_mean, blocks_in, fitting_factor, resampled
 from lightpaint.lighting import LiveView
+from lightpaint.paint.protocol import PictureUpdate
 from lightpaint.report import resized, thumbnail
 
 #: Approximate pixels of a thumbnail's longer side.
@@ -86,6 +87,16 @@ class PictureTable:
     def put(self, name: str, picture: Picture) -> None:
         """Add a picture that is already made."""
         self.offer(name, lambda: picture)
+
+    def put_all(self, pictures: Mapping[str, Picture]) -> PictureUpdate:
+        """Add pictures that are already made, by name; return the message that announces them."""
+        for name, picture in pictures.items():
+            self.put(name, picture)
+        return self.announcement(pictures)
+
+    def announcement(self, names: Iterable[str]) -> PictureUpdate:
+        """Return the message that announces these pictures."""
+        return PictureUpdate(resources={name: self.generations[name] for name in names})
 
     def keep(self, name: str, picture: Picture) -> None:
         """Keep a picture that its maker would make."""

@@ -28,9 +28,9 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.studio.session_exports import EXPORTS, folder_name, new_folder
+from lightpaint.paint.studio import session_exports
 from lightpaint.paint.subject import Subject, painting_path
-from lightpaint.progress import Progress, cancellable
+from lightpaint.progress import cancellable
 
 #: Names of long tasks.
 TaskName = Literal["export", "verify", "explain"]
@@ -94,7 +94,7 @@ class BackgroundJobs:
             self._stop_count += 1
             return [TaskStarted(task="stop")]
         elif message.name:
-            folder_name(message.name)
+            session_exports.folder_name(message.name)
         task_name, work = starters[type(message)]
         self._threads.start_low_priority(lambda: work(message), task_name)
         return [TaskStarted(task=task_name)]
@@ -158,18 +158,12 @@ class BackgroundJobs:
 
         stop_count: how often exports had been stopped when this one was requested.
         """
-        # Imported here: it loads all rooms, and painting needs only a few.
-        from lightpaint.paint.studio.session_exports import NEEDS_PAINTING, WRITES_PAINTING, export
 
         def check() -> None:
             if self._stop_count != stop_count:
                 raise StoppedError
 
-        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            del label  # a page does not show the steps of an export
-            check()
-            self._publisher.report_progress("export", done, total, unit)
-
+        report = self._publisher.reporter(check, "export")
         files: list[Path] = []
         try:
             # A stop also ends the exact solve, which may take long.
@@ -180,9 +174,13 @@ class BackgroundJobs:
                     check()
                     outputs = message.outputs
                     subjects = tuple(replace(subject, folder=folder) for subject in subjects)
-                    for file in export(subjects, snapshot, lighting, outputs, report, layers):
+                    for file in session_exports.export(
+                        subjects, snapshot, lighting, outputs, report, layers
+                    ):
                         files.append(file)  # one by one: a stop keeps those already written
-                    if snapshot.requests.placed and WRITES_PAINTING & set(message.outputs):
+                    if snapshot.requests.placed and session_exports.WRITES_PAINTING & set(
+                        message.outputs
+                    ):
                         places = snapshot.requests.placed
                         files.append(write_places(folder, self._mover.rig, places))
         except StoppedError:
@@ -191,8 +189,11 @@ class BackgroundJobs:
                 self._publisher.publish(result)
             return
         # The command names only paintings that this export wrote: older files may differ.
-        has_painting = bool(WRITES_PAINTING & set(message.outputs))
-        is_missing = bool(NEEDS_PAINTING & set(message.outputs)) and not snapshot.painted_views
+        has_painting = bool(session_exports.WRITES_PAINTING & set(message.outputs))
+        is_missing = (
+            bool(session_exports.NEEDS_PAINTING & set(message.outputs))
+            and not snapshot.painted_views
+        )
         sensors = snapshot.painted_sensors if has_painting and not is_missing else ()
         result = ExportResult(
             files=_absolute_names(files),
@@ -205,7 +206,11 @@ class BackgroundJobs:
         """Return a new folder for the files of an export; without a name the name of the
         session."""
         session_folder = self._subjects[0].folder
-        return new_folder(session_folder / EXPORTS, name) if name else nullcontext(session_folder)
+        return (
+            session_exports.new_folder(session_folder / session_exports.EXPORTS, name)
+            if name
+            else nullcontext(session_folder)
+        )
 
     def _run_verify(self, request: protocol.Verify) -> None:
         def check() -> None:
@@ -223,16 +228,9 @@ class BackgroundJobs:
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view and compare. check: raises StoppedError after a stop."""
-        from lightpaint.paint.studio.session_exports import render_verification
-
-        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            check()
-            self._publisher.report_progress(label, done, total, unit)
-
         subjects, snapshot, lighting = self.exact_answer(check)
-        progress: Progress = report
-        picture, text, agrees = render_verification(
-            subjects[view], snapshot.bases[view], lighting, progress
+        picture, text, agrees = session_exports.render_verification(
+            subjects[view], snapshot.bases[view], lighting, self._publisher.reporter(check)
         )
         if remark := shadow_remark(self._mover.rig, snapshot.requests.placed):
             text = f"{text} {remark}."

@@ -158,10 +158,7 @@ class ChoiceSolver:
         """Store the pictures, and return the message; None if the session has changed since."""
         if self._access.version != snapshot.version:
             return None
-        table = self._publisher.pictures
-        for name, picture in pictures.items():
-            table.put(name, picture)
-        resources = {name: table.generations[name] for name in pictures}
+        resources = self._publisher.pictures.put_all(pictures).resources
         self._last = protocol.AnswerChoices(
             version=snapshot.version, choices=choices, resources=resources
         )

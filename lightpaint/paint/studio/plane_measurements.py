@@ -80,12 +80,7 @@ class PlaneMeasurements:
 
     def _measure(self, requests: SessionRequests) -> None:
         """Measure the planes with the lights of these requests, and publish the state with them."""
-
-        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            del label  # rounds of samples have labels of their own
-            self._check(requests)
-            self._publisher.report_progress(TASK, done, total, unit)
-
+        report = self._publisher.reporter(lambda: self._check(requests), TASK)
         try:
             with MITSUBA.low_priority():
                 planes = self._measured(requests, report)
