@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session.live_answer import LiveReadings
+from lightpaint.paint.session.live_answer import READING_SHARE, LivePace
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
@@ -129,10 +128,9 @@ def test_readings_take_a_tenth_of_the_time_of_a_stroke() -> None:
         now += 0.02
         return "reading"
 
-    readings = LiveReadings(lambda: now)
-    answer: Any = SimpleNamespace(planes_reading=planes_reading)
+    pace = LivePace(READING_SHARE, clock_s=lambda: now)
     while now < 0.7:
-        readings.take(answer)
+        pace.take(planes_reading)
         now += 0.01
     assert taken == pytest.approx([0.0, 0.22, 0.44, 0.66], abs=0.02)
 

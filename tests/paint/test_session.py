@@ -23,7 +23,7 @@ from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
-from lightpaint.paint.session.live_answer import LiveDrives
+from lightpaint.paint.session.live_answer import DRIVES_S, DRIVES_SHARE, LivePace
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
@@ -179,13 +179,14 @@ def test_drives_come_during_a_stroke_and_cost_little_of_its_time(basis: lp.Basis
     assert last.drives is None
     # Each reading of this clock takes 20 ms: that is what drives cost.
     now = count(0.0, 0.02)
-    pace = LiveDrives(lambda: next(now))
-    lamps, weights = session.live_answer.lamps, session.weights
-    taken = [pace.take(lamps, weights) is not None for _ in range(100)]
+    pace = LivePace(DRIVES_SHARE, DRIVES_S, lambda: next(now))
+    taken = [pace.take(session.live_answer.drives) is not None for _ in range(100)]
     assert taken[0]
     # 20 ms of every 420 at most, and of readings between them each is 20 ms.
     assert 1 < sum(taken) <= 100 * 0.02 / 0.4 + 1
-    assert pace.take({}, weights) is None
+    [without_lamps] = session_of(basis).handle(*paint(1, (2, 9, 3, 12), 0.9, is_final=False))
+    assert isinstance(without_lamps, protocol.AnswerUpdate)
+    assert without_lamps.drives is None
 
 
 def test_an_answer_is_that_of_solve(basis: lp.Basis):

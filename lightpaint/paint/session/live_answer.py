@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from lightpaint.paint.protocol import PlanesReading
 from lightpaint.paint.session.session_planes import SessionPlanes, WishesInEffect
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
 from lightpaint.pipeline.job.settings import Settings
+
+_Result = TypeVar("_Result")
 
 #: Share of the time that readings of planes take at most: the power of many lamps takes longer than
 #: an answer.
@@ -109,6 +111,25 @@ class LiveAnswer:
     def lamps(self) -> Mapping[int, Lamp]:
         """The lamps that mix lights from emitters, by the light's index."""
         return self._live.lamps
+
+    def drives(self) -> tuple[tuple[float, ...] | None, ...]:
+        """Return the drives of the emitters of each light in the answer, None without any."""
+        lamps = self.lamps
+        return tuple(
+            tuple(lamps[k].drives_for(weight).tolist()) if k in lamps else None
+            for k, weight in enumerate(self.weights)
+        )
+
+    def named_drives(self, weights: Doubles) -> dict[str, dict[str, float]]:
+        """Return the drives of the lamps of emitters, by name of light and emitter.
+
+        weights: (n, 3), in the order of the lights; of lights that were added last some may lack.
+        """
+        names = self._basis.names
+        return {
+            names[k]: dict(zip(lamp.names, lamp.drives_for(weights[k]).tolist(), strict=True))
+            for k, lamp in self.lamps.items()
+        }
 
     @property
     def mode(self) -> str:
@@ -271,51 +292,28 @@ def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> D
     return new_weights
 
 
-class LiveReadings:
-    """Readings of the planes, renewed from time to time. clock_s: a clock in seconds."""
+class LivePace:
+    """The pace of work during a stroke: it is done only as often as it costs little of the time.
 
-    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
-        self._clock_s = clock_s
+    share: of the time that the work takes at most. least_s: least seconds between two results.
+    clock_s: a clock in seconds.
+    """
+
+    def __init__(
+        self, share: float, least_s: float = 0.0, clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._share, self._least_s, self._clock_s = share, least_s, clock_s
         self._next_s = float("-inf")
 
-    def take(self, answer: LiveAnswer) -> PlanesReading | None:
-        """Return what an answer gives on measuring planes; None without any, and if it is too early
-        for them.
-        """
+    def take(self, work: Callable[[], _Result]) -> _Result | None:
+        """Return the result of the work; None, and do nothing, if it is too early for it."""
         begin_s = self._clock_s()
         if begin_s < self._next_s:
             return None
-        reading = answer.planes_reading()
+        result = work()
         end_s = self._clock_s()
-        self._next_s = end_s + (end_s - begin_s) / READING_SHARE
-        return reading
-
-
-class LiveDrives:
-    """Drives of all lamps of emitters, renewed from time to time. clock_s: a clock in seconds."""
-
-    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
-        self._clock_s = clock_s
-        self._next_s = float("-inf")
-
-    def take(
-        self, lamps: Mapping[int, Lamp], weights: Doubles
-    ) -> tuple[tuple[float, ...] | None, ...] | None:
-        """Return the drives of each light, None for lights without emitters; None for all if it is
-        too early for them.
-
-        lamps: by index of the light. weights: (n, 3).
-        """
-        begin_s = self._clock_s()
-        if not lamps or begin_s < self._next_s:
-            return None
-        drives = tuple(
-            tuple(lamps[k].drives_for(weight).tolist()) if k in lamps else None
-            for k, weight in enumerate(weights)
-        )
-        end_s = self._clock_s()
-        self._next_s = end_s + max(DRIVES_S, (end_s - begin_s) / DRIVES_SHARE)
-        return drives
+        self._next_s = end_s + max(self._least_s, (end_s - begin_s) / self._share)
+        return result
 
 
 def changed_requests(

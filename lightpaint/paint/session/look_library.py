@@ -280,11 +280,7 @@ class LookLibrary:
         self, weights: Doubles, requests: SessionRequests
     ) -> dict[str, dict[str, float]]:
         """Return the drives of the lamps of emitters, by name, of lights with these weights."""
-        names, output = self._session.bases[0].names, self._output_of(weights, requests)
-        return {
-            names[k]: dict(zip(lamp.names, lamp.drives_for(output[k]).tolist(), strict=True))
-            for k, lamp in self._session.live_answer.lamps.items()
-        }
+        return self._session.live_answer.named_drives(self._output_of(weights, requests))
 
     def _store(self, look: StoredLook) -> None:
         self._session.store.put_look(look)

@@ -32,9 +32,11 @@ from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session import session_messages
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import (
+    DRIVES_S,
+    DRIVES_SHARE,
+    READING_SHARE,
     LiveAnswer,
-    LiveDrives,
-    LiveReadings,
+    LivePace,
     RequestChange,
     changed_requests,
     move_lights,
@@ -110,7 +112,8 @@ class Session:
             transform=transform,
             lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )
-        self._live_drives, self._live_readings = LiveDrives(), LiveReadings()
+        self._drives_pace = LivePace(DRIVES_SHARE, DRIVES_S)
+        self._readings_pace = LivePace(READING_SHARE)
         self.history = History(store, self.views, self.live_answer)
         self.references = ReferenceTable(store, transform)
         self._update_answer()
@@ -274,9 +277,10 @@ class Session:
         """Return the answer to paint or a change of layers, with the steps once it is one."""
         if is_final:
             return self.answer_update(**self.edit_state)
-        drives = self._live_drives.take(self.live_answer.lamps, self.weights)
-        fields: dict[str, Any] = {} if drives is None else {"drives": drives}
-        return self.answer_update(**fields, reading=self._live_readings.take(self.live_answer))
+        answer = self.live_answer
+        drives = self._drives_pace.take(answer.drives) if answer.lamps else None
+        reading = self._readings_pace.take(answer.planes_reading)
+        return self.answer_update(drives=drives, reading=reading)
 
     def _patch_messages(self, regions: Changes) -> list[Message]:
         """Return the pixels of changed regions: a message per view, or one if there are none."""

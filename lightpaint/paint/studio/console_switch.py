@@ -146,8 +146,4 @@ class ConsoleSwitch:
 
 def drives_of_session(session: Session) -> RigDrives:
     """Return the drives of the lamps of emitters in the answer under the master dimmer."""
-    names, weights = session.basis.names, session.weights * session.requests.master
-    return {
-        names[k]: dict(zip(lamp.names, lamp.drives_for(weights[k]).tolist(), strict=True))
-        for k, lamp in session.live_answer.lamps.items()
-    }
+    return session.live_answer.named_drives(session.weights * session.requests.master)

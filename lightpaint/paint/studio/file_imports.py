@@ -2,7 +2,8 @@
 
 import hashlib
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,20 @@ class ReceivedFile:
         return parts
 
 
+@contextmanager
+def received(parts: list[bytes], name: str) -> Iterator[Path]:
+    """Yield a file with these parts, which are taken; errors call it by `name`."""
+    with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
+        path = Path(folder) / "received"
+        path.write_bytes(b"".join(parts))
+        parts.clear()
+        try:
+            yield path
+        except LightpaintError as error:
+            text = error.sentence.spelled(lambda datum: name if datum == path else None)
+            raise PaintError(text) from None
+
+
 def begin_with_layers(session: Session, path: Path) -> bool:
     """Replace the layers by the layers of a file, as a step, unless the session has done that
     before.
@@ -109,41 +124,33 @@ class LayerImports:
         self, message: protocol.ImportLayers, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Take a part of a file; read the file after the last. Raises PaintError for no part."""
-        if message.view >= len(self._access.session.views):
-            raise PaintError(f"no view {message.view}: there are {len(self._access.session.views)}")
-        if message.replaces and len(self._access.session.views) > 1:
+        views = self._access.session.views
+        _ = views[message.view]  # raises PaintError if there is no such view
+        if message.replaces and len(views) > 1:
             raise PaintError("layers of a file are of one view: put them on top")
         if (parts := self._file.take(message, arrays)) is not None:
             self._threads.start_low_priority(lambda: self._import(message, parts), "import")
         return [TaskStarted(task="import")]
 
     def _import(self, message: protocol.ImportLayers, parts: list[bytes]) -> None:
-        """Give the session the layers of a file that has arrived, and publish its changes."""
+        """Give the session the layers of a file that has arrived, and publish its changes.
+
+        Raises LightpaintError if that is impossible.
+        """
         session, name = self._access.session, one_line(message.name)
-        with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
-            path = Path(folder) / "layers"
-            path.write_bytes(b"".join(parts))
-            parts.clear()
-            try:
-                size = session.views[message.view].size
-                layers = read_layers(path, size, session.transform)
-            except LightpaintError as error:
-                text = error.sentence.spelled(lambda datum: name if datum == path else None)
-                self._publisher.publish(Notice(text=text, tone="warn"))
-                return
+        with received(parts, name) as path:
+            layers = read_layers(path, session.views[message.view].size, session.transform)
         layers = replace(layers, view=None if message.replaces else message.view)
 
         def load() -> list[Message]:
-            try:
-                session.client_left(with_stroke=True)
-                return _load(session, layers, name)
-            except LightpaintError as error:
-                return [Notice(text=str(error), tone="warn")]
+            session.client_left(with_stroke=True)
+            return _load(session, layers, name)
 
-        messages = self._publisher.publish_all_made(load)
-        if not any(isinstance(each, Notice) for each in messages):
+        try:
+            self._publisher.publish_all_made(load)
             self._publisher.publish(Notice(text=_report(layers.layers, name), tone="info"))
-        self._on_loaded()
+        finally:
+            self._on_loaded()
 
 
 def _report(layers: LayerStack, name: str) -> str:
@@ -176,23 +183,16 @@ class ReferenceImports:
         return [TaskStarted(task="reference")]
 
     def _add(self, file_name: str, parts: list[bytes]) -> None:
-        """Keep a file that has arrived as a reference, and publish the list or why not."""
+        """Keep a file that has arrived as a reference, and publish the list.
+
+        Raises LightpaintError if that is impossible.
+        """
         session, name = self._access.session, one_line(file_name)
-        with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
-            path = Path(folder) / "reference"
-            path.write_bytes(b"".join(parts))
-            try:
-                pixels = read_reference(path, session.transform)
-            except LightpaintError as error:
-                text = error.sentence.spelled(lambda datum: name if datum == path else None)
-                self._publisher.publish(Notice(text=text, tone="warn", task="reference"))
-                return
+        with received(parts, name) as path:
+            pixels = read_reference(path, session.transform)
 
         def add() -> Message:
-            try:
-                session.references.add(Path(name).stem or name, pixels)
-            except LightpaintError as error:
-                return Notice(text=str(error), tone="warn", task="reference")
+            session.references.add(Path(name).stem or name, pixels)
             return self._list()
 
         self._publisher.publish_made(add)
