@@ -168,11 +168,6 @@ def one_sentence(error):
     return " ".join(str(error).split())
 
 
-def has_memory(scene):
-    """Return whether lightpaint has changed anything in a scene."""
-    return bool(recall(scene))
-
-
 def known_looks(scene):
     """Return the looks of the painter, or those kept in the folder while it does not run."""
     session = controller.session
@@ -252,6 +247,14 @@ class LookOperator(ShotOperator):
             raise ValueError("this look is no longer there")
         return looks[self.index]
 
+    def set_lamps(self, context):
+        """Set the lamps to the chosen look. Return its name, and the places of the lamps."""
+        name, factors = self.look(context)
+        groups = grouped_places(context.scene, context.view_layer)
+        show_factors(groups, factors, working_space(bpy.data))
+        show_drives(groups, {})
+        return name, groups
+
 
 class LIGHTPAINT_OT_apply_look(LookOperator):
     """Set the lamps to this look: one step of undo"""
@@ -259,10 +262,7 @@ class LIGHTPAINT_OT_apply_look(LookOperator):
     bl_idname, bl_label = "lightpaint.apply_look", "Apply Look"
 
     def run(self, context):
-        name, factors = self.look(context)
-        groups = grouped_places(context.scene, context.view_layer)
-        show_factors(groups, factors, working_space(bpy.data))
-        show_drives(groups, {})
+        name, _ = self.set_lamps(context)
         apply_levels(context.scene, context.view_layer)
         return f"the lamps are set to {name}"
 
@@ -273,10 +273,7 @@ class LIGHTPAINT_OT_key_look(LookOperator):
     bl_idname, bl_label = "lightpaint.key_look", "Key Look"
 
     def run(self, context):
-        name, factors = self.look(context)
-        groups = grouped_places(context.scene, context.view_layer)
-        show_factors(groups, factors, working_space(bpy.data))
-        show_drives(groups, {})
+        name, groups = self.set_lamps(context)
         key_levels(groups, context.scene.frame_current)
         apply_levels(context.scene, context.view_layer)
         return f"{name} is keyed at frame {context.scene.frame_current}"

@@ -236,18 +236,16 @@ def show_drives(groups, drives):
 
 def keep_drives(groups):
     """Make the drives that are shown be the ones that a discarded preview returns to."""
-    for places in groups.values():
-        for place in places:
-            memory = recall(place.owner)
-            if (shown := _shown(place.owner)) or KEPT in memory:
-                remember(place.owner, {**memory, KEPT: shown})
+    for place in _each(groups):
+        memory = recall(place.owner)
+        if (shown := _shown(place.owner)) or KEPT in memory:
+            remember(place.owner, {**memory, KEPT: shown})
 
 
 def discard_drives(groups):
     """Put back the drives of before the preview."""
-    for places in groups.values():
-        for place in places:
-            _set(place.owner, recall(place.owner).get(KEPT, {}))
+    for place in _each(groups):
+        _set(place.owner, recall(place.owner).get(KEPT, {}))
 
 
 def forget_drives(owner):

@@ -111,8 +111,8 @@ class NodeEmission:
     def animated_target(self):
         if self.is_textured:
             sockets = [self.multiplier.inputs[1]] if self.multiplier else []
-            return self.owner.node_tree, tuple(s.path_from_id("default_value") for s in sockets)
-        sockets = [self.colour, *[self.strength] * self.has_strength]
+        else:
+            sockets = [self.colour, *[self.strength] * self.has_strength]
         return self.owner.node_tree, tuple(s.path_from_id("default_value") for s in sockets)
 
     def make_keyable(self):
@@ -169,14 +169,17 @@ def driver_curves(owner):
 
 def action_curves(owner):
     """Return the keyframe curves of a piece of data, of old actions and of those in layers."""
+    holder = curve_holder(owner)
+    return list(holder.fcurves) if holder else []
+
+
+def curve_holder(owner):
+    """Return the holder of the keyframe curves of a piece of data; None if it has none."""
     animation = getattr(owner, "animation_data", None)
     action = animation.action if animation else None
-    if action is None:
-        return []
-    if hasattr(action, "fcurves"):
-        return list(action.fcurves)
-    bag = channel_bag(animation)
-    return list(bag.fcurves) if bag else []
+    if action is None or hasattr(action, "fcurves"):
+        return action
+    return channel_bag(animation)
 
 
 def channel_bag(animation):
@@ -190,12 +193,8 @@ def channel_bag(animation):
 
 
 def remove_curves(owner, paths):
-    """Delete the keyframe curves of some paths, and the action if it has no others."""
-    animation = getattr(owner, "animation_data", None)
-    action = animation.action if animation else None
-    if action is None:
-        return
-    holder = action if hasattr(action, "fcurves") else channel_bag(animation)
+    """Delete the keyframe curves of some paths."""
+    holder = curve_holder(owner)
     for curve in list(holder.fcurves) if holder else []:
         if curve.data_path in paths:
             holder.fcurves.remove(curve)
@@ -275,10 +274,8 @@ def world_emitter(world):
 
 def has_nodes(owner):
     """Return whether nodes decide what emits; from Blender 5 on they do wherever there are any."""
-    if owner.node_tree is None:
-        return False
     # Blender 5 warns of everybody who asks.
-    return owner.node_tree is not None if _nodes_always(owner) else owner.use_nodes
+    return owner.node_tree is not None and (_nodes_always(owner) or owner.use_nodes)
 
 
 def _nodes_always(owner):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cycles, light groups and passes of a view layer: switched on, remembered, and put back."""
 
+from operator import attrgetter
+
 import bpy
 
 from ..lamps.grouping import assign_groups, clear_others, plan_groups
@@ -8,10 +10,7 @@ from ..lamps.lamp_levels import forget_drives, put_back_levels, remove_keys
 from ..lamps.memory import forget, owners_with_memory, recall, remember
 
 #: Passes that denoise the painter's pictures, and the mattes that it selects objects by.
-PASSES = (
-    ("cycles", "denoising_store_passes"),
-    ("", "use_pass_cryptomatte_object"),
-)
+PASSES = ("cycles.denoising_store_passes", "use_pass_cryptomatte_object")
 
 
 def prepare(scene, view_layer, by):
@@ -27,8 +26,8 @@ def prepare(scene, view_layer, by):
     remember(scene, memory)
     if scene.render.engine != "CYCLES":
         scene.render.engine = "CYCLES"
-    for holder, name in PASSES:
-        setattr(getattr(view_layer, holder) if holder else view_layer, name, True)
+    for path in PASSES:
+        set_property(view_layer, path, True)
     view_layer.use_pass_combined = True
     _set_groups(scene, view_layer, list(grouping.members))
     clear_others(grouping, view_layer, scene)
@@ -64,19 +63,22 @@ def _put_back_scene(scene, memory):
         if view_layer is None:
             continue
         _set_groups(scene, view_layer, state["groups"])
-        for key, value in state["passes"].items():
-            holder, _, attribute = key.rpartition(".")
-            setattr(getattr(view_layer, holder) if holder else view_layer, attribute, value)
+        for path, value in state["passes"].items():
+            set_property(view_layer, path, value)
     if scene.render.engine == "CYCLES":
         scene.render.engine = memory["engine"]
+
+
+def set_property(owner, path, value):
+    """Set a property of a piece of data, or of one within it: `cycles.use_denoising`."""
+    *holders, name = path.split(".")
+    setattr(attrgetter(".".join(holders))(owner) if holders else owner, name, value)
 
 
 def _layer_state(view_layer):
     """Return what a view layer has before it is prepared."""
     values = {"use_pass_combined": view_layer.use_pass_combined}
-    for holder, name in PASSES:
-        owner = getattr(view_layer, holder) if holder else view_layer
-        values[f"{holder}.{name}" if holder else name] = getattr(owner, name)
+    values |= {path: attrgetter(path)(view_layer) for path in PASSES}
     return {"groups": [group.name for group in view_layer.lightgroups], "passes": values}
 
 

@@ -17,7 +17,7 @@ from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lighting_presets import PRESETS, find_preset, requested_look
-from lightpaint.paint.references.reference_table import Reference, ReferenceTable
+from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.painting_session import Session
@@ -124,10 +124,39 @@ def offer_ground(table: PictureTable, view: Canvas, transform: ViewTransform) ->
         offer("detail", lambda: as_halves(look_detail(view.live, view.current, view.basis)))
 
 
+def _offer_numbered(
+    table: PictureTable,
+    prefix: str,
+    picture: Callable[..., Picture],
+    *,
+    count: int = 1,
+    has_views: bool = False,
+) -> None:
+    """Offer pictures that are named by numbers, as `step/12` and `lights_at/ROW,COLUMN@VIEW`.
+
+    picture: returns the picture of `count` numbers and, if `has_views`, the index of a view.
+    """
+
+    def named(name: str) -> Picture:
+        numbers, _, view = name.partition("@") if has_views else (name, "", "")
+        parts = numbers.split(",")
+        if len(parts) != count or not all(x.isdecimal() for x in (*parts, view or "0")):
+            raise PaintError(f"there is no picture {f'{prefix}/{name}'[:40]!r}")
+        views = [int(view or 0)] if has_views else []
+        return picture(*map(int, parts), *views)
+
+    table.offer_family(prefix, named)
+
+
 def offer_layers(table: PictureTable, views: Canvases) -> None:
     """Offer the pixels of the layers, as `layer/3`, and what is selected, as `selection/0`."""
-    table.offer_family("layer", partial(_layer, views))
-    table.offer_family("selection", partial(_selection, views))
+    _offer_numbered(
+        table,
+        "layer",
+        lambda number, view: _layer_picture(views.layers[number], views[view]),
+        has_views=True,
+    )
+    _offer_numbered(table, "selection", lambda view: selection_mask(views[view].selection))
 
 
 def offer_presets(table: PictureTable, view: Canvas, transform: ViewTransform) -> None:
@@ -145,26 +174,18 @@ def offer_lights_at(table: PictureTable, views: Canvases) -> None:
     """Offer the light of each lamp around a pixel, as `lights_at/ROW,COLUMN@VIEW`, (n, 3): the
     means over blocks that follow the brush.
     """
-
-    def lights(name: str) -> Picture:
-        place, _, view = name.partition("@")
-        row, _, column = place.partition(",")
-        if not (row.isdecimal() and column.isdecimal() and (view or "0").isdecimal()):
-            raise PaintError(f"there is no picture {f'lights_at/{name}'[:40]!r}")
-        return views[int(view or 0)].live.lights_at(int(row), int(column))
-
-    table.offer_family("lights_at", lights)
+    _offer_numbered(
+        table,
+        "lights_at",
+        lambda row, column, view: views[view].live.lights_at(row, column),
+        count=2,
+        has_views=True,
+    )
 
 
 def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> None:
     """Offer the small pictures of the history's steps, as `step/12`."""
-
-    def picture(step: str) -> Picture:
-        if not step.isdecimal():
-            raise PaintError(f"there is no picture {f'step/{step}'[:40]!r}")
-        return picture_of(int(step))
-
-    table.offer_family("step", picture)
+    _offer_numbered(table, "step", picture_of)
 
 
 def offer_references(table: PictureTable, references: ReferenceTable) -> None:
@@ -172,30 +193,15 @@ def offer_references(table: PictureTable, references: ReferenceTable) -> None:
     as `reference_light/2`.
     """
 
-    def light(name: str) -> Picture:
-        picture = references.light(_numbered(references, "reference_light", name))
+    def light(number: int) -> Picture:
+        picture = references.light(references[number])
         height, width = picture.shape[:2]
         factor = min(1.0, LIGHT_SIDE / max(height, width))
         size = max(1, round(height * factor)), max(1, round(width * factor))
         return as_halves(resampled(picture, size))
 
-    table.offer_family(
-        "reference", lambda name: references.picture(_numbered(references, "reference", name))
-    )
-    table.offer_family("reference_light", light)
-
-
-def _numbered(references: ReferenceTable, prefix: str, name: str) -> Reference:
-    if not name.isdecimal():
-        raise PaintError(f"there is no picture {f'{prefix}/{name}'[:40]!r}")
-    return references[int(name)]
-
-
-def _layer(views: Canvases, name: str) -> Picture:
-    number, _, view = name.partition("@")
-    if not (number.isdecimal() and (view or "0").isdecimal()):
-        raise PaintError(f"there is no picture {f'layer/{name}'[:40]!r}")
-    return _layer_picture(views.layers[int(number)], views[int(view or 0)])
+    _offer_numbered(table, "reference", lambda number: references.picture(references[number]))
+    _offer_numbered(table, "reference_light", light)
 
 
 def _layer_picture(layer: Layer, view: Canvas) -> npt.NDArray[np.float32]:
@@ -206,12 +212,6 @@ def _layer_picture(layer: Layer, view: Canvas) -> npt.NDArray[np.float32]:
     image, coverage, _ = pixels.part(pixels.bounds)
     mask = coverage[..., None]
     return mask if layer.is_mask else np.concatenate([image, mask], axis=-1)
-
-
-def _selection(views: Canvases, view: str) -> Picture:
-    if not view.isdecimal():
-        raise PaintError(f"there is no picture {f'selection/{view}'[:40]!r}")
-    return selection_mask(views[int(view)].selection)
 
 
 def _plane(basis: Basis, k: int) -> Picture:
