@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import samples
+
+_View = TypeVar("_View")
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 PREVIEW_SPP = (2, 8, 32, 128)
@@ -366,6 +368,13 @@ def painting_transform(subjects: Sequence[Subject], bases: Sequence[Basis]) -> V
 def sensor_name(scene: Scene | SceneFacts) -> str:
     """Return the name of the sensor that a scene is seen through."""
     return scene.sensor if isinstance(scene, SceneFacts) else scene.sensor_names[scene.sensor]
+
+
+def view_at(views: Sequence[_View], number: int) -> _View:
+    """Return what belongs to a view, from 0 on. Raises PaintError if there is no such view."""
+    if number >= len(views):
+        raise PaintError(f"no view {number}: there are {len(views)}")
+    return views[number]
 
 
 def painting_path(folder: Path, sensor: str) -> Path:

@@ -146,10 +146,7 @@ SKIPPED_COLLECTIONS = frozenset(
         "packed_files",
         "views",
         "stereo_views",
-        "selected_objects",
         "id_properties",
-        "view_layers",
-        "keying_sets",
     ]
 )
 

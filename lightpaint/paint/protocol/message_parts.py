@@ -215,10 +215,7 @@ class LayerInfo(Layer):
 
 @dataclass(frozen=True)
 class LayerList:
-    """The layers of the painting, the lowest first. next: the id of the next new one.
-
-    layers: of the painting.
-    """
+    """The layers of the painting. layers: the lowest first. next: the id of the next new one."""
 
     layers: tuple[LayerInfo, ...]
     next: int
@@ -256,10 +253,7 @@ class LookInfo:
 
 @dataclass(frozen=True)
 class TransformInfo:
-    """The view transform that the pictures are seen through, and its exposure in stops.
-
-    name: of the transform. stops: exposure.
-    """
+    """The view transform that the pictures are seen through. name: its own. stops: its exposure."""
 
     name: str
     stops: float
@@ -267,7 +261,7 @@ class TransformInfo:
 
 @dataclass(frozen=True)
 class TableInfo:
-    """The grid of the view transforms' tables: points on a side, lowest and highest log2 light.
+    """The grid of the view transforms' tables.
 
     side: points on a side. low, high: lowest and highest log2 light.
     """
@@ -279,10 +273,9 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel: of the current basis, and of the final one.
+    """Samples per pixel.
 
-    spp: of the current basis. target_spp: of the final one. is_complete: whether all samples are
-    there.
+    spp: of the current basis. target_spp: of the final one. is_complete: whether all are there.
     """
 
     spp: int
@@ -292,10 +285,7 @@ class SampleCount:
 
 @dataclass(frozen=True)
 class HistoryInfo:
-    """Labels of the last steps that can be undone and redone; count: of all steps.
-
-    undo, redo: labels of steps.
-    """
+    """The history. undo, redo: labels of the last steps that can be. count: of all steps."""
 
     undo: tuple[str, ...]
     redo: tuple[str, ...]

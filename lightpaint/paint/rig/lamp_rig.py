@@ -32,7 +32,7 @@ from lightpaint.paint.rig import page_geometry
 from lightpaint.paint.rig.added_lights import POSE_KEYS, light_of_new, new_emitter, site_of_new
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import Subject, view_at
 from lightpaint.scene import Pose, Scene, motion_of, render_features
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
@@ -359,9 +359,7 @@ class LampRig:
     def view(self, number: int) -> RigView:
         """Return a view of the open rig. Raises PaintError if there is none."""
         assert self.views is not None
-        if number >= len(self.views):
-            raise PaintError(f"no view {number}: there are {len(self.views)}")
-        return self.views[number]
+        return view_at(self.views, number)
 
     # What pages draw
 

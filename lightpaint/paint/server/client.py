@@ -175,14 +175,11 @@ class Client:
     async def send_all(self) -> None:
         """Send queued messages until the client is abandoned."""
         while not self._is_abandoned:
-            while not self._unsent:
+            if not self._unsent:
                 self._all_sent.set()
                 self._has_unsent.clear()
                 await self._has_unsent.wait()
-                if self._is_abandoned:
-                    break
-            if self._is_abandoned:
-                break
+                continue
             message, reply = self._unsent.pop(0)
             self._may_read_on.set()
             frame = to_frame(message.content(reply), message.buffers())

@@ -151,9 +151,7 @@ class LiveAnswer:
         """Return the constraints of requests, combined with the constraints of the scene."""
         requests = requests or self.requests
         constraints = self._base_constraints.and_then(requests.constraints())
-        wishes = self._wishes_under(requests)
-        required = None if wishes is None else wishes.requirements
-        return replace(constraints, requirements=required)
+        return replace(constraints, requirements=self._requirements(requests))
 
     def set_planes(self, planes: SessionPlanes) -> None:
         """Meet the wishes for planes from now on, unless requests say to ignore them.
@@ -242,9 +240,12 @@ class LiveAnswer:
 
     def _constraints(self, requests: SessionRequests) -> lighting.Constraints:
         """Return all constraints, with what the wishes for planes require."""
-        wishes = self._wishes_under(requests)
-        required = None if wishes is None else wishes.requirements
+        required = self._requirements(requests)
         return replace(self._unrequired(requests, self._basis.lights), requirements=required)
+
+    def _requirements(self, requests: SessionRequests) -> lighting.Requirements | None:
+        wishes = self._wishes_under(requests)
+        return None if wishes is None else wishes.requirements
 
     def _unrequired(self, requests: SessionRequests, lights: Lights) -> lighting.Constraints:
         """Return all constraints but what wishes for planes require. lights: under the requests."""

@@ -54,9 +54,7 @@ class SessionSnapshot:
     @property
     def painted_sensors(self) -> tuple[str, ...]:
         """The same names of the painted views."""
-        if len(self.bases) == 1:
-            return ("",)
-        return tuple(self.bases[k].origin.sensor for k in self.painted_views)
+        return tuple(self.sensors[k] for k in self.painted_views)
 
     def lighting_of(self, weights: Doubles) -> lighting.Lighting:
         """Return the lighting of weights (n, 3), with what mixes each light."""

@@ -29,7 +29,14 @@ from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio import session_exports
-from lightpaint.paint.subject import Subject, painting_path
+from lightpaint.paint.studio.session_exports import (
+    EXPORTS,
+    NEEDS_PAINTING,
+    WRITES_PAINTING,
+    folder_name,
+    new_folder,
+)
+from lightpaint.paint.subject import Subject, painting_path, view_at
 from lightpaint.progress import cancellable
 
 #: Names of long tasks.
@@ -84,17 +91,17 @@ class BackgroundJobs:
             if not message.run:
                 self._verify_request = None
                 return [TaskStarted(task="stop")]
-            if self._subject(message.view).scene is None:
+            if view_at(self._subjects, message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
             # Set here, not in its thread: the next message may stop it.
             self._verify_request = message
         elif isinstance(message, protocol.Explain):
-            self._subject(message.view)
+            view_at(self._subjects, message.view)
         elif not message.run:
             self._stop_count += 1
             return [TaskStarted(task="stop")]
         elif message.name:
-            session_exports.folder_name(message.name)
+            folder_name(message.name)
         task_name, work = starters[type(message)]
         self._threads.start_low_priority(lambda: work(message), task_name)
         return [TaskStarted(task=task_name)]
@@ -104,7 +111,7 @@ class BackgroundJobs:
 
         requests: those after the change. A later preview replaces an earlier one.
         """
-        self._subject(message.view)
+        view_at(self._subjects, message.view)
         self._preview_number = message.number
         self._threads.start_low_priority(lambda: self._run_preview(message, requests), "preview")
         return [TaskStarted(task="preview")]
@@ -128,11 +135,6 @@ class BackgroundJobs:
             replace(result, is_old=version_at_render != version)
             for version_at_render, result in results
         )
-
-    def _subject(self, view: int) -> Subject:
-        if view >= len(self._subjects):
-            raise PaintError(f"no view {view}: there are {len(self._subjects)}")
-        return self._subjects[view]
 
     def exact_answer(
         self, check: Callable[[], None]
@@ -178,9 +180,7 @@ class BackgroundJobs:
                         subjects, snapshot, lighting, outputs, report, layers
                     ):
                         files.append(file)  # one by one: a stop keeps those already written
-                    if snapshot.requests.placed and session_exports.WRITES_PAINTING & set(
-                        message.outputs
-                    ):
+                    if snapshot.requests.placed and WRITES_PAINTING & set(message.outputs):
                         places = snapshot.requests.placed
                         files.append(write_places(folder, self._mover.rig, places))
         except StoppedError:
@@ -189,11 +189,8 @@ class BackgroundJobs:
                 self._publisher.publish(result)
             return
         # The command names only paintings that this export wrote: older files may differ.
-        has_painting = bool(session_exports.WRITES_PAINTING & set(message.outputs))
-        is_missing = (
-            bool(session_exports.NEEDS_PAINTING & set(message.outputs))
-            and not snapshot.painted_views
-        )
+        has_painting = bool(WRITES_PAINTING & set(message.outputs))
+        is_missing = bool(NEEDS_PAINTING & set(message.outputs)) and not snapshot.painted_views
         sensors = snapshot.painted_sensors if has_painting and not is_missing else ()
         result = ExportResult(
             files=_absolute_names(files),
@@ -206,11 +203,7 @@ class BackgroundJobs:
         """Return a new folder for the files of an export; without a name the name of the
         session."""
         session_folder = self._subjects[0].folder
-        return (
-            session_exports.new_folder(session_folder / session_exports.EXPORTS, name)
-            if name
-            else nullcontext(session_folder)
-        )
+        return new_folder(session_folder / EXPORTS, name) if name else nullcontext(session_folder)
 
     def _run_verify(self, request: protocol.Verify) -> None:
         def check() -> None:

@@ -33,7 +33,7 @@ from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.session_file import StoredRecords
-from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
+from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path, view_at
 from lightpaint.pipeline import LIGHTING, RELIT, Job, run, write_answer
 from lightpaint.progress import Progress, cancellable
 from lightpaint.relit import relight, verify_in_stages
@@ -326,12 +326,11 @@ class FinalRenders:
 
     def _start(self, request: protocol.RenderFinal) -> RenderInfo:
         """Add a render to the list. Raises PaintError, and OutputError if it cannot be written."""
-        if request.view >= len(self._subjects):
-            raise PaintError(f"no view {request.view}: there are {len(self._subjects)}")
-        if self._subjects[request.view].scene is None:
+        subject = view_at(self._subjects, request.view)
+        if subject.scene is None:
             raise PaintError("there is no scene to render: it was opened from a saved basis")
         folder_name(request.name)
-        check_writable(self._subjects[request.view].folder / RENDERS)
+        check_writable(subject.folder / RENDERS)
         with self._change:
             self._open_records()
             number = max(self._infos, default=0) + 1
@@ -381,13 +380,7 @@ class FinalRenders:
     ) -> None:
         """Render the answer in a view, and write it to a new folder."""
         # Imported here: they load all rooms, and painting needs only a few.
-        from lightpaint.pipeline import (
-            LIGHTING,
-            render_final,
-            write_answer,
-            write_final_exr,
-            write_final_png,
-        )
+        from lightpaint.pipeline import render_final, write_final_exr, write_final_png
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             if not self._change_info(number, done=done, total=total):
