@@ -45,27 +45,18 @@ class ComposedPlanes(RowPlanes):
     """Planes picked from other planes, which are read on request. picks: one for each light."""
 
     def __init__(self, picks: Sequence[PlaneReference], size: tuple[int, int]) -> None:
-        self._picks, self._size = tuple(picks), size
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return len(self._picks)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._size
+        self._picks = tuple(picks)
+        self.count, self.size = len(picks), size
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
         pick = self._picks[i]
-        return np.zeros((*self._size, 3), np.float32) if pick is None else pick[0].plane(pick[1])
+        return np.zeros((*self.size, 3), np.float32) if pick is None else pick[0].plane(pick[1])
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
-        top, bottom = max(top, 0), min(bottom, self._size[0])
-        composed = np.zeros((self.count, max(bottom - top, 0), self._size[1], 3), np.float32)
+        top, bottom = max(top, 0), min(bottom, self.size[0])
+        composed = np.zeros((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
         sources = {id(pick[0]): pick[0] for pick in self._picks if pick is not None}
         for key, source in sources.items():
             rows = source.rows(top, bottom)
@@ -109,16 +100,7 @@ class BlockPlanes(RowPlanes):
         self._whole, self._weight, self._side = whole, weight, side
         total = block_sums(weight, side)
         self._total = np.where(total > 0, total, 1)[..., None]
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._whole.count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in blocks."""
-        return self._total.shape[0], self._total.shape[1]
+        self.count, self.size = whole.count, (len(total), total.shape[1])  # in blocks
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -199,16 +181,7 @@ class JoinedRow(RowPlanes):
         self._parts = tuple(parts)
         ends = accumulate((part.size[0] * part.size[1] for part in parts), initial=0)
         self._ends = list(ends)
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._parts[0].count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(1, pixels)."""
-        return 1, self._ends[-1]
+        self.count, self.size = parts[0].count, (1, self._ends[-1])
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (1, p, 3)."""
@@ -254,6 +227,7 @@ class ScaledPlanes(RowPlanes):
 
     def __init__(self, picture: Floats, colours: Doubles) -> None:
         self._picture, self._colours = picture, np.asarray(colours, np.float32)
+        self.count, self.size = len(colours), (picture.shape[0], picture.shape[1])
 
     @classmethod
     def summing_to(cls, picture: Floats, weights: Doubles) -> "ScaledPlanes":
@@ -264,16 +238,6 @@ class ScaledPlanes(RowPlanes):
         is_on = weights != 0
         share = 1 / np.maximum(is_on.sum(axis=0), 1)
         return cls(picture, np.divide(share, weights, out=np.zeros(weights.shape), where=is_on))
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return len(self._colours)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._picture.shape[0], self._picture.shape[1]
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""

@@ -60,19 +60,14 @@ class Planes(Protocol):
     """The planes of n lights, (h, w, 3) each, float32 whatever the stored type.
 
     Returned arrays are read-only by convention: they may share the memory of the planes.
+
+    count: number of lights. size: (height, width) in pixels. is_noisy: whether most planes are
+    stored in half floats, whose rounding their noise hides.
     """
 
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
+    count: int
+    size: tuple[int, int]
+    is_noisy: bool
 
     def __iter__(self) -> Iterator[Floats]:
         """Yield the planes, (h, w, 3) each."""
@@ -135,35 +130,14 @@ class Planes(Protocol):
         """Return all planes, (n, h, w, 3): for interactive use and small images."""
 
 
-class PlanesBase:
+class PlanesBase(Planes):
     """Implementation shared by all planes: sums and squares, computed block by block."""
 
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        raise NotImplementedError
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        raise NotImplementedError
-
-    def plane(self, i: int) -> Floats:
-        """Return the plane of light i, (h, w, 3)."""
-        raise NotImplementedError
+    is_noisy = False
 
     def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
         return slice(None), self.plane(i).reshape(-1, 3).T
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        return False
-
-    def pixels(self, where: slice | Indices) -> Floats:
-        """Return some pixels of all planes, (n, p, 3)."""
-        raise NotImplementedError
 
     @property
     def strip_pixels(self) -> int:
@@ -184,10 +158,6 @@ class PlanesBase:
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3)."""
         return np.asarray(self.mixes(np.asarray(weights)[None])[0])
-
-    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
-        raise NotImplementedError
 
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64. weights: (n, 3)."""
@@ -344,16 +314,7 @@ class MemoryPlanes(PlanesBase):
 
     def __init__(self, images: Floats) -> None:
         self._images = images
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return len(self._images)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._images.shape[1], self._images.shape[2]
+        self.count, self.size = len(images), (images.shape[1], images.shape[2])
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -439,7 +400,7 @@ def thinned(planes: Planes, step: int, factors: Doubles) -> Iterator[Floats]:
     yield from np.concatenate(parts, axis=1)
 
 
-def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
+def block_of(planes: Planes) -> tuple[int, Any]:
     """Return the number of pixels whose light is multiplied at a time, and the type of products.
 
     Products of many lights take most of a solve, and half as long in float32. Their round-off, 10⁻⁷
@@ -451,13 +412,13 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     return BLOCK_PIXELS // parts, np.float32 if is_single else np.float64
 
 
-def _release_after_walk(planes: PlanesBase) -> None:
+def _release_after_walk(planes: Planes) -> None:
     """Return the memory of a walk over many lights, which the C library keeps for each thread."""
     if planes.count >= LARGE_BLOCK_LIGHTS:
         release_freed_memory()
 
 
-def walked_blocks(planes: "Planes | PlanesBase", stop: int, start: int = 0) -> list[slice]:
+def walked_blocks(planes: Planes, stop: int, start: int = 0) -> list[slice]:
     """Return the parts of consecutive pixels of which the light of all planes, in float64 as well,
     is in memory at a time, by each thread.
     """
@@ -465,7 +426,7 @@ def walked_blocks(planes: "Planes | PlanesBase", stop: int, start: int = 0) -> l
     return [slice(first, min(first + step, stop)) for first in range(start, stop, step)]
 
 
-def blocks_of(planes: "Planes | PlanesBase", counted: Indices) -> list[Indices]:
+def blocks_of(planes: Planes, counted: Indices) -> list[Indices]:
     """Return the blocks of some pixels, in order, whose light is multiplied at a time.
 
     Of planes in strips, a block has whole strips: looking for a part of one takes as long.

@@ -43,26 +43,12 @@ class DeferredPlanes(RowPlanes):
 
     def __init__(self, planes: FilePlanes, load: LoadOnce, number: int) -> None:
         self._of_file, self._load, self._number = planes, load, number
+        self.count, self.size, self.is_noisy = planes.count, planes.size, planes.is_noisy
 
     @property
     def whole(self) -> Planes:
         """The planes, read now if they are not yet."""
         return self._load()[self._number]
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._of_file.count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._of_file.size
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        return self._of_file.is_noisy
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""

@@ -45,17 +45,11 @@ PICKED_MAX_BYTES = 2**27
 class RowPlanes(PlanesBase):
     """Planes that are read by rows; subclasses implement `rows`.
 
-    Walks over pixels visit the same rows repeatedly, so a few strips of rows are kept.
+    Walks over pixels visit the same rows repeatedly, so a few strips of rows are kept. chunk_rows:
+    number of rows that the file stores as one chunk, which can only be read together.
     """
 
-    def rows(self, top: int, bottom: int) -> Floats:
-        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
-        raise NotImplementedError
-
-    @property
-    def chunk_rows(self) -> int:
-        """Number of rows that the file stores as one chunk, which can only be read together."""
-        return 1
+    chunk_rows = 1
 
     @cached_property
     def strip_rows(self) -> int:
@@ -217,32 +211,13 @@ class FilePlanes(RowPlanes):
         scales: Sequence[float] | None = None,
     ) -> None:
         self._file, self._parts, self._number = file, tuple(parts), number
+        self.count, self.size = len(parts), parts[0].display
+        name = PLANE_CHANNELS[number][0]
+        halves = (is_lit_part(x.channels) or x.channels[name].itemsize == 2 for x in parts)
+        self.is_noisy = 2 * sum(halves) > self.count
+        self.chunk_rows = max(part.lines for part in parts)
         self._scales = tuple(scales or (1.0 for _ in parts))
         self._lit_rows: dict[int, LitRows] = {}
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return len(self._parts)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._parts[0].display
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        name = PLANE_CHANNELS[self._number][0]
-        halves = [
-            is_lit_part(part.channels) or part.channels[name].itemsize == 2 for part in self._parts
-        ]
-        return 2 * sum(halves) > len(halves)
-
-    @property
-    def chunk_rows(self) -> int:
-        """Number of rows that the file stores as one chunk, which can only be read together."""
-        return max(part.lines for part in self._parts)
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -279,21 +254,7 @@ class PickedPlanes(RowPlanes):
 
     def __init__(self, whole: RowPlanes, where: Indices) -> None:
         self._whole, self._where = whole, where
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._whole.count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(1, pixels)."""
-        return 1, len(self._where)
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        return self._whole.is_noisy
+        self.count, self.size, self.is_noisy = whole.count, (1, len(where)), whole.is_noisy
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (1, p, 3)."""
@@ -324,21 +285,7 @@ class ReplacedPlanes(RowPlanes):
 
     def __init__(self, whole: RowPlanes, planes: Mapping[int, Floats]) -> None:
         self._whole, self._planes = whole, dict(planes)
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._whole.count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._whole.size
-
-    @property
-    def chunk_rows(self) -> int:
-        """Number of rows that the file stores as one chunk, which can only be read together."""
-        return self._whole.chunk_rows
+        self.count, self.size, self.chunk_rows = whole.count, whole.size, whole.chunk_rows
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -397,35 +344,25 @@ class SpooledPlanes(RowPlanes):
     """
 
     def __init__(self, planes: RowPlanes) -> None:
-        self._count, self._size = planes.count, planes.size
+        self.count, self.size = planes.count, planes.size
         self._file = TemporaryArray((planes.count * 3 * planes.size[0] * planes.size[1],))
         for top, bottom in self._ranges(0, planes.size[0]):
             rows = planes.rows(top, bottom)
             self._file.write(self._place(top), rows.transpose(0, 3, 1, 2))
 
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._size
-
     def _ranges(self, top: int, bottom: int) -> list[tuple[int, int]]:
         """Return the first row and the end of each strip that some rows touch."""
-        step, height = self.strip_rows, self._size[0]
+        step, height = self.strip_rows, self.size[0]
         starts = range(top // step * step, bottom, step)
         return [(start, min(start + step, height)) for start in starts]
 
     def _place(self, top: int) -> int:
         """Return the number of values before the strip that begins at a row."""
-        return 3 * self._count * top * self._size[1]
+        return 3 * self.count * top * self.size[1]
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        height, width = self._size
+        height, width = self.size
         image = np.empty((height, width, 3), np.float32)
         for top, bottom in self._ranges(0, height):
             strip = np.empty((3, bottom - top, width), np.float32)
@@ -435,14 +372,14 @@ class SpooledPlanes(RowPlanes):
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
-        top, bottom = max(top, 0), min(bottom, self._size[0])
+        top, bottom = max(top, 0), min(bottom, self.size[0])
         parts = []
         for first, end in self._ranges(top, bottom):
-            strip = np.empty((self._count, 3, end - first, self._size[1]), np.float32)
+            strip = np.empty((self.count, 3, end - first, self.size[1]), np.float32)
             self._file.read(self._place(first), strip)
             parts.append(strip[:, :, max(top - first, 0) : bottom - first])
         if not parts:
-            return np.zeros((self._count, 0, self._size[1], 3), np.float32)
+            return np.zeros((self.count, 0, self.size[1], 3), np.float32)
         block = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
         return block.transpose(0, 2, 3, 1)
 

@@ -129,8 +129,9 @@ class EncodedPlanes(RowPlanes):
         is_decoded_once: bool = True,
         halves: npt.NDArray[np.float16] | None = None,
     ) -> None:
-        self._count, self._size = len(planes), planes[0].size
-        singles_bytes = 12 * self._count * self._size[0] * self._size[1]
+        self.count, self.size = len(planes), planes[0].size
+        self.is_noisy = 2 * sum(x.encoding.kind == HALF for x in planes) > self.count
+        singles_bytes = 12 * self.count * self.size[0] * self.size[1]
         self._is_decoded_once = is_decoded_once and singles_bytes <= DECODED_MAX_BYTES
         self._stored, self._halves = list(planes), halves
         self._lock = Lock()
@@ -152,21 +153,6 @@ class EncodedPlanes(RowPlanes):
         ]
 
     @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._size
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        return 2 * sum(x.encoding.kind == HALF for x in self._stored) > self._count
-
-    @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
         if self._decoded is not None:
@@ -180,7 +166,7 @@ class EncodedPlanes(RowPlanes):
             if self._decoded is None:
                 return plane
             # Numbers that were decoded are rounded to themselves.
-            singles = self._decoded[i].reshape(3, *self._size)
+            singles = self._decoded[i].reshape(3, *self.size)
             return EncodedPlane(plane.encoding, plane.encoding.encoded(singles))
 
     def plane(self, i: int) -> Floats:

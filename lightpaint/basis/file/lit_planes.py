@@ -120,17 +120,17 @@ class LitPlanes(RowPlanes):
         size: tuple[int, int],
         release: Callable[[], None] = lambda: None,
     ) -> None:
-        self._count, self._size = len(planes), size
+        self.count, self.size = len(planes), size
         self._scales = np.array([plane.scale for plane in planes], np.float32)
         (height, width), step = size, self.strip_rows
         edges = [width * row for row in [*range(0, height, step), height]]
         self._begins = edges[:-1]  # of strips, in pixels
         self._mixes = KeptMixes()
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
-        self._is_noisy = 2 * sum(is_half) > len(planes)
+        self.is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
-        clean = [i for i in range(len(planes)) if self._is_noisy and not is_half[i]]
-        kind = np.float16 if self._is_noisy else np.float32
+        clean = [i for i in range(len(planes)) if self.is_noisy and not is_half[i]]
+        kind = np.float16 if self.is_noisy else np.float32
         nothing = LitPlane(np.zeros(0, np.uint32), np.zeros((3, 0), kind), 1.0)
         same = [nothing if i in clean else x.in_kind(kind) for i, x in enumerate(planes)]
         # As lists, of which there are hundreds of thousands of slices.
@@ -159,24 +159,9 @@ class LitPlanes(RowPlanes):
             keep(in_memory=True)
 
     @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._count
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._size
-
-    @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
         return self._lit.nbytes
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if most planes are stored in half floats, whose rounding their noise hides."""
-        return self._is_noisy
 
     def stored(self, i: int) -> LitPlane:
         """Return the plane of light i as it is stored."""
@@ -227,9 +212,9 @@ class LitPlanes(RowPlanes):
 
     def _dense(self, pixels: slice | Indices, values: Floats) -> Floats:
         """Return the plane, (h, w, 3), with light, (3, p), in some pixels alone."""
-        plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+        plane = np.zeros((3, self.size[0] * self.size[1]), np.float32)
         plane[:, pixels] = values
-        return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
+        return np.ascontiguousarray(plane.T).reshape(*self.size, 3)
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
@@ -241,10 +226,10 @@ class LitPlanes(RowPlanes):
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
-        (height, width), step = self._size, self.strip_rows
+        (height, width), step = self.size, self.strip_rows
         top, bottom = max(top, 0), min(bottom, height)
         if top >= bottom:
-            return np.zeros((self._count, 0, width, 3), np.float32)
+            return np.zeros((self.count, 0, width, 3), np.float32)
         strips = [
             self._read_strip(k)[:, max(top - k * step, 0) : bottom - k * step]
             for k in range(top // step, -(-bottom // step))
@@ -253,20 +238,20 @@ class LitPlanes(RowPlanes):
 
     @cached_property
     def _is_mostly_black(self) -> bool:
-        pixels = self._size[0] * self._size[1]
+        pixels = self.size[0] * self.size[1]
         lit = pixels * len(self._clean) + self._lit.lit_count
-        return lit <= MAX_LIT_SHARE * self._count * pixels
+        return lit <= MAX_LIT_SHARE * self.count * pixels
 
     @property
     def strip_pixels(self) -> int:
         """Number of pixels of a strip, or 1 if `lit_entries` has none of them."""
-        return self.strip_rows * self._size[1] if self._is_mostly_black else 1
+        return self.strip_rows * self.size[1] if self._is_mostly_black else 1
 
     def lit_entries(self, where: slice | Indices) -> LitEntries | None:
         """Return the lit ones of some pixels, in row-major order, of all planes; None if many
         are.
         """
-        pixels = self._size[0] * self._size[1]
+        pixels = self.size[0] * self.size[1]
         if not self._is_mostly_black:
             return None
         if isinstance(where, slice):
@@ -286,16 +271,16 @@ class LitPlanes(RowPlanes):
         lights, columns, values = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
         if (self._scales != 1).any():
             values *= self._scales[lights]
-        return LitEntries(lights, columns, values, (self._count, len(where)))
+        return LitEntries(lights, columns, values, (self.count, len(where)))
 
     def _read_strip(self, k: int) -> Floats:
         """Return a strip, (n, rows, w, 3)."""
-        block, begin = self._lit.strip(k).decoded(), k * self.strip_rows * self._size[1]
+        block, begin = self._lit.strip(k).decoded(), k * self.strip_rows * self.size[1]
         for i in self._clean:
             block[i] = self._clean.pixels(i, begin, begin + block.shape[2])
         if (self._scales != 1).any():
             block *= self._scales[:, None, None]
-        return block.reshape(self._count, 3, -1, self._size[1]).transpose(0, 2, 3, 1)
+        return block.reshape(self.count, 3, -1, self.size[1]).transpose(0, 2, 3, 1)
 
     def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
@@ -304,11 +289,11 @@ class LitPlanes(RowPlanes):
         else:
             mixed = self._exact_mixes(np.asarray(weights))
         images = mixed.transpose(0, 2, 1).astype(np.float32, order="C")
-        return images.reshape(len(weights), *self._size, 3)
+        return images.reshape(len(weights), *self.size, 3)
 
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
-        counted, (power, totals) = mask.ravel(), np.zeros((2, self._count, 3))
+        counted, (power, totals) = mask.ravel(), np.zeros((2, self.count, 3))
         for k, begin in enumerate(with_progress(self._begins, "strips")):
             strip = self._lit.strip(k)
             of_strip = strip.power_and_totals(counted[begin : begin + strip.size])
@@ -329,11 +314,11 @@ class LitPlanes(RowPlanes):
         blocks are at its right and bottom edges.
         """
         (height, width), columns = weight.shape, -(-weight.shape[1] // side)
-        sums = np.zeros((3, self._count, bottom - top, columns))
+        sums = np.zeros((3, self.count, bottom - top, columns))
         first, last = top * side, min(bottom * side, height)
-        weights = np.zeros(self._size)
+        weights = np.zeros(self.size)
         weights[first:last, :width] = weight[first:last]
-        row, column = np.indices((self.strip_rows, self._size[1])).reshape(2, -1)
+        row, column = np.indices((self.strip_rows, self.size[1])).reshape(2, -1)
         # Pixels outside have no weight, whatever their block.
         column = np.minimum(column // side, columns - 1)
         step = self.strip_rows
@@ -343,13 +328,13 @@ class LitPlanes(RowPlanes):
             end = min(-(-(k * step + step) // side) - top, bottom - top)
             of_block = np.clip((row + k * step) // side - top, begin, end - 1) - begin
             groups = (of_block * columns + column)[: strip.size]
-            start = k * step * self._size[1]
+            start = k * step * self.size[1]
             of_strip = weights.ravel()[start : start + strip.size]
             found = strip.sums_of_groups(groups, of_strip, (end - begin) * columns)
-            sums[:, :, begin:end] += found.reshape(3, self._count, end - begin, columns)
+            sums[:, :, begin:end] += found.reshape(3, self.count, end - begin, columns)
         for i in self._clean:
-            plane = self._clean.pixels(i, first * self._size[1], last * self._size[1])
-            rows = plane.reshape(3, last - first, self._size[1])
+            plane = self._clean.pixels(i, first * self.size[1], last * self.size[1])
+            rows = plane.reshape(3, last - first, self.size[1])
             channels = rows[:, :, :width] * weight[first:last]
             sums[:, i] = [block_sums(channel, side) for channel in channels]
         scaled: Doubles = sums.transpose(1, 2, 3, 0) * self._scales[:, None, None, None]

@@ -266,16 +266,7 @@ class SumPlanes(RowPlanes):
 
     def __init__(self, sets: SumSets, number: int) -> None:
         self._sets, self._number = sets, number
-
-    @property
-    def count(self) -> int:
-        """Number of lights."""
-        return self._sets.lights
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self._sets.size
+        self.count, self.size = sets.lights, sets.size
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
