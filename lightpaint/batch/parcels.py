@@ -22,7 +22,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.work.item_execution import run_item
-from lightpaint.batch.work.work_items import ItemResult, Task, WorkItem, item_label
+from lightpaint.batch.work.work_items import ItemResult, Task, WorkItem, item_label, with_paths
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
@@ -143,7 +143,7 @@ class ParcelStore:
                 )
                 return ItemResult(item.name, item.kind, failure)
         os.chdir(parcel.place)
-        return run_item(item.with_paths(self._path_map(parcel)))
+        return run_item(with_paths(item, self._path_map(parcel)))
 
     def _run_apart(self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]) -> ItemResult:
         root = self._folder / "runs" / parcel.run
@@ -164,7 +164,7 @@ class ParcelStore:
             os.link(self._file(digest), place)
             links[place] = self._file(digest)
         os.chdir(start_folder)
-        result = run_item(item.with_paths(self._path_map(parcel, root)))
+        result = run_item(with_paths(item, self._path_map(parcel, root)))
         if target is None or result.failure:
             failure = Sentence(result.failure).mapped(lambda text: text.replace(str(root), ""))
             # The full disk is this worker's own; another worker may have room.

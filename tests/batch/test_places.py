@@ -12,6 +12,7 @@ import lightpaint as lp
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
+from lightpaint.batch.work.work_items import with_paths
 from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -174,7 +175,7 @@ def test_looks_that_cannot_share_places(folder: Path, change: tuple[str, str], w
 def test_a_job_with_places_is_sent_and_read_again(folder: Path) -> None:
     first = plan_batch(folder / "looks.toml", folder / "out")
     [task] = [x.steps[0].task for x in first.looks if x.entry.name == "day"]
-    moved_task = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
+    moved_task = with_paths(task, lambda text: text.replace(str(folder), "/elsewhere"))
     assert moved_task.places == "/elsewhere/out/places/day.json"
     assert json.loads(moved_task.job)["placement"] == {"path": moved_task.places}
 

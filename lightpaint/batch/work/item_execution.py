@@ -313,14 +313,6 @@ class SharedPlacing:
         """Saved bases."""
         return tuple(file for file in self.files if file)
 
-    def with_paths(self, move: work_items.PathMap) -> "SharedPlacing":
-        """Return the same item with other paths."""
-        return replace(
-            self,
-            tasks=tuple(task.with_paths(move) for task in self.tasks),
-            files=tuple(file and move(file) for file in self.files),
-        )
-
 
 def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listener) -> str:
     """Return the record of the places that all looks of an item want."""

@@ -5,7 +5,7 @@ A work item is files and plain values. It can be sent anywhere and done twice, w
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -58,9 +58,6 @@ class WorkItem(Protocol):
     def expected_s(self) -> float:
         """Rough estimate of its time on one thread."""
 
-    def with_paths(self, move: PathMap) -> "WorkItem":
-        """Return the same item with other paths."""
-
 
 def item_label(item: WorkItem) -> str:
     """Return the label of an item: `evening: answer`, `part 3`."""
@@ -104,15 +101,6 @@ class SceneFilm:
     light_names: tuple[str, ...] = ()
     places: str = ""
 
-    def with_paths(self, move: PathMap) -> "SceneFilm":
-        """Return the same with other paths."""
-        return replace(
-            self,
-            scene=scene_with_paths(self.scene, move),
-            files=tuple(map(move, self.files)),
-            places=self.places and move(self.places),
-        )
-
     def without_content(self) -> "SceneFilm":
         """Return the same film, with nothing loaded yet."""
         return replace(self, scene=self.scene.without_content())
@@ -141,10 +129,6 @@ class GuideTraining:
         """Files of the scene."""
         return self.film.files
 
-    def with_paths(self, move: PathMap) -> "GuideTraining":
-        """Return the same item with other paths."""
-        return replace(self, film=self.film.with_paths(move))
-
 
 @dataclass(frozen=True)
 class PartOfBasis:
@@ -169,11 +153,6 @@ class PartOfBasis:
         """File of the guide's table."""
         return (self.guide_file,) if self.guide_file else ()
 
-    def with_paths(self, move: PathMap) -> "PartOfBasis":
-        """Return the same item with other paths."""
-        guide_file = move(self.guide_file) if self.guide_file else ""
-        return replace(self, film=self.film.with_paths(move), guide_file=guide_file)
-
 
 @dataclass(frozen=True)
 class PaintingOfSums:
@@ -182,15 +161,6 @@ class PaintingOfSums:
     painting: pipeline.Painting
     emitters: Emitters
     resize: bool
-
-    def with_paths(self, move: PathMap) -> "PaintingOfSums":
-        """Return the same with other paths."""
-        painting = self.painting
-        paths: dict[str, Any] = {
-            name: value if (value := getattr(painting, name)) is None else move(value)
-            for name in ("path", "mask", "template")
-        }
-        return replace(self, painting=replace(painting, **paths))
 
 
 @dataclass(frozen=True)
@@ -221,16 +191,6 @@ class SumsOfRows:
         """File of the guide's table."""
         return (self.guide_file,)
 
-    def with_paths(self, move: PathMap) -> "SumsOfRows":
-        """Return the same item with other paths."""
-        return replace(
-            self,
-            film=self.film.with_paths(move),
-            guide_file=move(self.guide_file),
-            paintings=tuple(painting.with_paths(move) for painting in self.paintings),
-            files=tuple(map(move, self.files)),
-        )
-
 
 @dataclass(frozen=True)
 class Passes:
@@ -256,25 +216,6 @@ class Passes:
     def input_files(self) -> tuple[str, ...]:
         """Files of the scene."""
         return self.files
-
-    def with_paths(self, move: PathMap) -> "Passes":
-        """Return the same item with other paths."""
-        files = tuple(map(move, self.files))
-        return replace(self, relit=scene_with_paths(self.relit, move), files=files)
-
-
-def scene_with_paths(scene: pipeline.SceneFile, move: PathMap) -> pipeline.SceneFile:
-    """Return the same scene with other paths."""
-
-    def moved(path: str | None) -> str | None:
-        return None if path is None else move(path)
-
-    return replace(
-        scene,
-        path=move(scene.path),
-        lights_file=moved(scene.lights_file),
-        observer=moved(scene.observer),
-    )
 
 
 def render_seconds(samples: int, lights: int) -> float:
@@ -340,19 +281,6 @@ class Task:
     def local_files(self) -> tuple[str, ...]:
         """Saved bases; see `WorkItem`."""
         return tuple(file for file in (*self.files, *self.former_look_files) if file)
-
-    def with_paths(self, move: PathMap) -> "Task":
-        """Return the same task with other paths."""
-        return replace(
-            self,
-            job=json.dumps(_map_paths(json.loads(self.job), move)),
-            bases=tuple(json.dumps(_map_paths(json.loads(key), move)) for key in self.bases),
-            lightings=tuple(map(move, self.lightings)),
-            source_files=tuple(map(move, self.source_files)),
-            files=tuple(file and move(file) for file in self.files),
-            former_look_files=tuple(file and move(file) for file in self.former_look_files),
-            places=self.places and move(self.places),
-        )
 
 
 def answer_task(
@@ -436,10 +364,24 @@ def render_settings(settings: pipeline.Settings) -> dict[str, Any]:
     return {name: getattr(settings, name) for name in names}
 
 
-def _map_paths(content: Any, move: PathMap) -> Any:
-    """Return a job's plain values with other paths; `move` leaves all other texts unchanged."""
-    if isinstance(content, dict):
-        return {key: _map_paths(value, move) for key, value in content.items()}
-    if isinstance(content, list):
-        return [_map_paths(value, move) for value in content]
-    return move(content) if isinstance(content, str) else content
+def with_paths(value: Any, move: PathMap) -> Any:
+    """Return a work item, or what is in one, with other paths; `move` leaves all other texts
+    unchanged.
+    """
+    if isinstance(value, str):
+        return move(value)
+    if isinstance(value, dict):
+        return {key: with_paths(x, move) for key, x in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(with_paths(x, move) for x in value)
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    moved = {x.name: with_paths(getattr(value, x.name), move) for x in fields(value) if x.init}
+    if isinstance(value, Task):  # whose job and keys are texts of JSON
+        moved["job"] = _json_with_paths(value.job, move)
+        moved["bases"] = tuple(_json_with_paths(key, move) for key in value.bases)
+    return replace(value, **moved)
+
+
+def _json_with_paths(text: str, move: PathMap) -> str:
+    return json.dumps(with_paths(json.loads(text), move))
