@@ -26,6 +26,7 @@ from lightpaint.images import (
     block_mean,
     box_mean,
     denoised,
+    edge_padded,
     enlarged,
     oidn_is_installed,
     shifted,
@@ -128,7 +129,8 @@ def read_look(basis: Basis) -> Floats:
     def make() -> Floats:
         weights, look = basis.current_weights, basis.current_look
         clean = denoise_mix(basis, weights, factor=READ_SIDE)
-        return read_only(look + _on_pixels(clean - block_mean(look, READ_SIDE), look.shape))
+        change = enlarged(clean - block_mean(look, READ_SIDE), READ_SIDE)
+        return read_only(look + edge_padded(change, basis.size))
 
     return make_once(basis.planes, array_name("read look", basis.current_weights), make)
 
@@ -157,7 +159,8 @@ def read_look_noise(basis: Basis) -> Floats:
         clean = _within_neighbours(along_surfaces(direct), direct)
         share = share_of_clean(direct, direct_half, clean)
         left = left + direct_half + share * (along_surfaces(direct_half) - direct_half)
-        return read_only(noise + _on_pixels(left - half, noise.shape))
+        change = enlarged(left - half, READ_SIDE)
+        return read_only(noise + edge_padded(change, basis.size))
 
     return make_once(basis.planes, array_name("read noise", basis.current_weights), make)
 
@@ -174,16 +177,6 @@ def _can_read(basis: Basis) -> bool:
     if min(basis.planes.size) < READ_SIDE or basis.former is not None or not basis.knows_noise:
         return False
     return basis.indirect is not None and basis.surfaces(READ_SIDE)[1] is not None
-
-
-def _on_pixels(blocks: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return the values of blocks of `READ_SIDE` on all pixels of a picture, (h, w, 3).
-
-    Pixels at the right and at the bottom that fill no block have the value beside them.
-    """
-    whole = enlarged(blocks, READ_SIDE)
-    rest = [(0, side - known) for side, known in zip(shape[:2], whole.shape[:2], strict=True)]
-    return np.pad(whole, [*rest, (0, 0)], mode="edge")
 
 
 def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: MixQuality = "fast") -> Floats:
@@ -265,7 +258,7 @@ def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Float
 
     All are (h, w, 3), as in `share_of_clean`.
     """
-    return np.asarray(raw + share_of_clean(raw, half_difference, clean) * (clean - raw), np.float32)
+    return _mean_of(raw, clean, share_of_clean(raw, half_difference, clean))
 
 
 def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
@@ -278,16 +271,11 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
     Stray pixels, whose halves agree by chance, do not count for B, and are taken from the denoised
     form.
     """
-
-    def mean_square(values: Floats) -> Doubles:
-        return np.asarray(np.square(values, dtype=np.float64).mean(axis=-1), np.float64)
-
     is_stray = stray_pixels(raw, half_difference, clean)
-    noise, change = mean_square(half_difference), mean_square(clean - raw)
+    noise, change = _mean_square(half_difference), _mean_square(clean - raw)
     variance = box_mean(noise, RADIUS)
     lost_energy = np.maximum(box_mean(np.where(is_stray, 0, change - noise), RADIUS), 0)
-    total = variance + lost_energy
-    share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
+    share = _quotient(variance, variance + lost_energy)
     return np.where(is_stray, 1, share)[..., None].astype(np.float32)
 
 
@@ -298,17 +286,26 @@ def blend_where_sure(raw: Floats, half_difference: Floats, clean: Floats) -> Flo
     As `blend_by_noise`, with the squared bias of each window less two standard errors of its own.
     The estimate itself, above 0 by chance in half of all windows, would leave specks of grain.
     """
-
-    def mean_square(values: Floats) -> Doubles:
-        return np.asarray(np.square(values, dtype=np.float64).mean(axis=-1), np.float64)
-
-    noise = mean_square(half_difference)
-    lost = mean_square(clean - raw) - noise
+    noise = _mean_square(half_difference)
+    lost = _mean_square(clean - raw) - noise
     error = np.sqrt(box_mean(np.square(lost), RADIUS)) / (2 * RADIUS + 1)
     variance = box_mean(noise, RADIUS)
     total = variance + np.maximum(box_mean(lost, RADIUS) - SURE_ERRORS * error, 0)
-    share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
-    return np.asarray(raw + share[..., None].astype(np.float32) * (clean - raw), np.float32)
+    return _mean_of(raw, clean, _quotient(variance, total)[..., None].astype(np.float32))
+
+
+def _mean_square(values: Floats) -> Doubles:
+    """Return the mean over channels of squares, (h, w)."""
+    return np.asarray(np.square(values, dtype=np.float64).mean(axis=-1), np.float64)
+
+
+def _quotient(part: Floats, total: Floats) -> Floats:
+    return np.divide(part, total, out=np.zeros_like(total), where=total > 0)
+
+
+def _mean_of(raw: Floats, clean: Floats, share: Floats) -> Floats:
+    """Return (1 − t) raw + t clean, (h, w, 3) float32. share: t, (h, w, 1) float32."""
+    return np.asarray(raw + share * (clean - raw), np.float32)
 
 
 def stray_pixels(raw: Floats, half_difference: Floats, clean: Floats) -> npt.NDArray[np.bool_]:
@@ -370,7 +367,5 @@ def blend_by_grain(raw: Floats, clean: Floats) -> Floats:
     for step in ((0, 2), (2, 0), (2, 2), (2, -2)):
         others = np.roll(changed, step, (0, 1)) + np.roll(changed, (-step[0], -step[1]), (0, 1))
         np.maximum(shared, pooled(changed * others / 2), out=shared)
-    share = np.divide(
-        np.maximum(total - shared, 0), total, out=np.zeros_like(total), where=total > 0
-    )
-    return np.asarray(raw + share[..., None].astype(np.float32) * (clean - raw), np.float32)
+    share = _quotient(np.maximum(total - shared, 0), total)
+    return _mean_of(raw, clean, share[..., None].astype(np.float32))

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     )
     from lightpaint.images.pixel_blocks import (
         BAND_PIXELS, LARGE_PICTURE, Size, bands_of, block_mean, block_pixels, block_sums, blocks_in,
-        by_bands, check_factor, check_size, covered, enlarged, fitting_factor, in_turns, is_large,
-        left_over, resampled, sum_by_bands, whole_factor,
+        by_bands, check_factor, check_size, covered, edge_padded, enlarged, fitting_factor,
+        in_turns, is_large, left_over, resampled, sum_by_bands, whole_factor,
     )
     from lightpaint.images.surface_filter import SurfaceFilter
     # fmt: on

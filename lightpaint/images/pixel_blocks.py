@@ -223,3 +223,11 @@ def _in_blocks(image: Floats, factor: int) -> Floats:
 def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
     """Return an image with every pixel repeated factor × factor times."""
     return image.repeat(factor, axis=0).repeat(factor, axis=1)
+
+
+def edge_padded(image: npt.NDArray[Any], size: Size) -> npt.NDArray[Any]:
+    """Return an image, (h, w, n), at a larger `size`, (height, width): pixels at the right and at
+    the bottom, which fill no block, repeat those beside them.
+    """
+    rest = [(0, side - known) for side, known in zip(size, image.shape[:2], strict=True)]
+    return np.pad(image, [*rest, (0, 0)], mode="edge")

@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.images.denoiser import DARKEST, Features
-from lightpaint.images.pixel_blocks import block_mean, enlarged
+from lightpaint.images.pixel_blocks import block_mean, edge_padded, enlarged
 from lightpaint.threads import parallel_map
 
 #: Radius of the filter in pixels, which is two standard deviations.
@@ -72,8 +72,7 @@ class SurfaceFilter:
         """
         albedo = np.moveaxis(self._albedo, 0, -1)
         light = enlarged(small / block_mean(albedo, factor), factor)
-        rest = [(0, side - known) for side, known in zip(self.size, light.shape[:2], strict=True)]
-        return self(np.pad(light, [*rest, (0, 0)], mode="edge") * albedo)
+        return self(edge_padded(light, self.size) * albedo)
 
     @property
     def is_quick(self) -> bool:

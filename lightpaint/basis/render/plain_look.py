@@ -13,7 +13,7 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.derived_planes import ScaledPlanes
 from lightpaint.basis.light_basis import PLAIN_LOOK, Basis
 from lightpaint.basis.render.rendered_basis import basis_lights, origin_of
-from lightpaint.images import denoised, resampled
+from lightpaint.images import denoised, edge_padded, resampled
 from lightpaint.scene import (
     Scene,
     Stream,
@@ -81,11 +81,6 @@ def _emitters_seen(scene: Scene, loaded: Any) -> Bools:
 
 
 def _enlarged(picture: Floats, factor: int, size: tuple[int, int]) -> Floats:
-    """Return a picture of blocks of factor × factor pixels at `size`, (h, w, n) float32.
-
-    Pixels at the right and at the bottom that fill no block continue those beside them.
-    """
+    """Return a picture of blocks of factor × factor pixels at `size`, (h, w, n) float32."""
     height, width = picture.shape[:2]
-    whole = resampled(picture, (height * factor, width * factor))
-    rest = [(0, side - known) for side, known in zip(size, whole.shape[:2], strict=True)]
-    return np.pad(whole, [*rest, (0, 0)], mode="edge")
+    return edge_padded(resampled(picture, (height * factor, width * factor)), size)
