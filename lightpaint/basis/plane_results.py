@@ -39,11 +39,8 @@ def make_once(planes: Planes, key: Hashable, make: Callable[[], Result]) -> Resu
     """Return the result of `make`, which runs once for these planes; concurrent callers wait."""
     with _lock:
         memo = _memo_of(planes)
-        future = memo.get(key)
-        if future is not None:
-            is_mine = False
-        else:
-            future, is_mine = memo.setdefault(key, Future()), True
+        is_mine = key not in memo
+        future = memo.setdefault(key, Future())
     if is_mine:
         try:
             future.set_result(make())

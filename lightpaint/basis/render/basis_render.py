@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.light_basis import Basis
-from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render import banded_film, rendered_basis
 from lightpaint.basis.render.render_budget import Budget, Keeper, check_samples, steps
 from lightpaint.basis.render.separate_renders import LightSums, emitters_seen, render_separately
@@ -270,16 +269,9 @@ def _render_one_by_one(
     """
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
-    nothing = rendered_basis.origin_of(scene, seed, rendered_basis.SEPARATE, (0, 0), (0, 0))
 
     def basis(*, is_finished: bool = False) -> Basis:
-        images, half_differences = sums.mean_and_half_difference()
-        origin = replace(nothing, **sums.counts())
-        lights = rendered_basis.basis_lights(scene)
-        source = str(scene.path)
-        kept_sums = None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy())
-        planes = as_planes(images), as_planes(half_differences)
-        return Basis(lights, *planes, seen, origin, source=source, sums=kept_sums)
+        return rendered_basis.basis_of_passes(scene, seed, sums, seen, is_finished=is_finished)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

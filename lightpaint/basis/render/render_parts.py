@@ -17,7 +17,6 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.light_basis import Basis
-from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render import rendered_basis, separate_renders
 from lightpaint.basis.render.banded_film import (
     FileSums,
@@ -147,11 +146,7 @@ class PartRenderer:
     def _of_light(self, part: Part, light: int) -> tuple[Floats, Floats]:
         if self._light != light:
             self.close()
-            name = self._scene.lights[light].name
-            white, black = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-            self._loaded = self._scene.load(
-                {x.name: white if x.name == name else black for x in self._scene.lights}
-            )
+            self._loaded = separate_renders.load_one_light(self._scene, light)
             self._light = light
         assert part.half is not None
         which = light, part.half, part.number, part.spp, self._seed
@@ -256,24 +251,11 @@ class LightPasses:
         self._waiting[part] = image
         line = self._next[part.place]
         while line and line[0] in self._waiting:
-            light, half = line[0].place
-            self._sums.planes[half, light] += self._waiting.pop(line[0])
-            self._sums.spp[light, half] += line[0].spp
-            self._sums.passes[light, half] += 1
-            line.pop(0)
+            part = line.pop(0)
+            self._sums.add(*part.place, self._waiting.pop(part), part.spp)
 
     def basis(self, seed: int) -> Basis:
         """Return the basis after all passes were added."""
         scene, start = self._scene, self._start
-        images, half_differences = self._sums.mean_and_half_difference()
         seen = separate_renders.emitters_seen(scene) if start is None else start.emitters_seen
-        origin = rendered_basis.origin_of(
-            scene, seed, rendered_basis.method_of(scene), (0, 0), (0, 0)
-        )
-        return Basis(
-            rendered_basis.basis_lights(scene),
-            as_planes(images),
-            as_planes(half_differences),
-            seen,
-            replace(origin, **self._sums.counts()),
-        )
+        return rendered_basis.basis_of_passes(scene, seed, self._sums, seen)

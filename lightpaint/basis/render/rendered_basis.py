@@ -13,7 +13,7 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_budget import half_of
-from lightpaint.basis.render.separate_renders import plan_of_light
+from lightpaint.basis.render.separate_renders import LightSums, plan_of_light
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene import Scene
@@ -223,6 +223,23 @@ def basis_of_planes(
         extra=None if start is None else start.extra,
         source=str(scene.path),
         sums=sums,
+    )
+
+
+def basis_of_passes(
+    scene: Scene, seed: int, sums: LightSums, seen: Bools, *, is_finished: bool = True
+) -> Basis:
+    """Return the basis of separate renders. is_finished: whether it goes without its sums."""
+    images, half_differences = sums.mean_and_half_difference()
+    nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))
+    return Basis(
+        basis_lights(scene),
+        as_planes(images),
+        as_planes(half_differences),
+        seen,
+        replace(nothing, **sums.counts()),
+        source=str(scene.path),
+        sums=None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy()),
     )
 
 

@@ -67,6 +67,12 @@ class LightSums:
         sums.spp[:], sums.passes[:] = np.array(each_light)[:, :2], np.array(each_light)[:, 2:]
         return sums
 
+    def add(self, light: int, half: int, image: Floats, spp: int) -> None:
+        """Add the undivided sum of a pass, (h, w, 3), of `spp` samples per pixel."""
+        self.planes[half, light] += image
+        self.spp[light, half] += spp
+        self.passes[light, half] += 1
+
     def done(self, light: int) -> tuple[int, int]:
         """Return the samples per pixel of the two halves of a light."""
         a, b = self.spp[light].tolist()
@@ -109,9 +115,11 @@ def render_separately(
     try:
         with tracing() as let_others_through:
             for light, plan, after_pass in _turns(scene, budget, sums, progress):
-                loaded = _load_one_light(scene, light)
+                loaded = load_one_light(scene, light)
                 for half, pass_spp in plan:
-                    _add_pass(loaded, scene, sums, light, half, pass_spp, seed)
+                    number = int(sums.passes[light, half])
+                    image = light_pass(loaded, scene, light, half, number, pass_spp, seed)
+                    sums.add(light, half, image, pass_spp)
                     after_pass()
                     keeper.now_and_then(basis)
                     let_others_through()
@@ -187,18 +195,10 @@ def _progress_counter(label: str, plan: Plan, progress: Progress) -> Callable[[]
     return one_more
 
 
-def _load_one_light(scene: Scene, light: int) -> Any:
+def load_one_light(scene: Scene, light: int) -> Any:
+    """Load a scene in which one light is white and all others are off."""
     name = scene.lights[light].name
     return scene.load({x.name: WHITE if x.name == name else BLACK for x in scene.lights})
-
-
-def _add_pass(
-    loaded: Any, scene: Scene, sums: LightSums, light: int, half: int, spp: int, seed: int
-) -> None:
-    number = int(sums.passes[light, half])
-    sums.planes[half, light] += light_pass(loaded, scene, light, half, number, spp, seed)
-    sums.spp[light, half] += spp
-    sums.passes[light, half] += 1
 
 
 def light_pass(
