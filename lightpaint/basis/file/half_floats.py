@@ -422,14 +422,14 @@ def _power(values: Floats, places: slice | Indices, shape: tuple[int, ...]) -> D
     values: its numbers at some places in the order of memory; it is zero elsewhere. shape: (3,
     rows, w).
     """
-    tiles = _tiles(*shape)
+    tiles = tiles_of(*shape)
     squares = np.square(values, dtype=np.float64)
     power = np.bincount(tiles[places], squares, minlength=int(tiles[-1]) + 1)
     return np.asarray(power, np.float64)
 
 
 @lru_cache(maxsize=4)
-def _tiles(channels: int, rows: int, width: int) -> npt.NDArray[np.int32]:
+def tiles_of(channels: int, rows: int, width: int) -> npt.NDArray[np.int32]:
     """Return the index of the tile of each number of a strip, in the order of its memory."""
     down, across = -(-rows // TILE), -(-width // TILE)
     first = np.arange(channels)[:, None] * down + np.arange(rows) // TILE

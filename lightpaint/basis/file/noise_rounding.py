@@ -10,13 +10,12 @@ ratio of both is rounded rather than the half difference, so they stay equal.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, as_singles, read_only, round_to_halves
-from lightpaint.basis.file.half_floats import CLEAN, TILE, inner_pixels, scale_of
+from lightpaint.arrays import Doubles, Floats, Indices, as_singles, round_to_halves
+from lightpaint.basis.file.half_floats import CLEAN, inner_pixels, scale_of, tiles_of
 from lightpaint.basis.file.light_channels import noise_numbers
 from lightpaint.basis.file.lit_planes import LitPlane
 
@@ -77,7 +76,7 @@ def _rounded_pair(
     if (noise[light == 0] != 0).any():
         return None
     scale = scale_of(np.stack([light, noise]))
-    tiles, dither = _tiles(*size)[lit], _dither(light, lit)
+    tiles, dither = tiles_of(1, *size)[lit], _dither(light, lit)
     ratio = np.divide(noise, light, out=np.zeros_like(light), where=light != 0)
     hidden = HIDDEN_SHARE**2 * _power(noise, tiles)
     wanted = ROUNDING_POWER * np.maximum(_power(light, tiles), _power(noise, tiles))
@@ -151,11 +150,3 @@ def _power(values: Floats, tiles: npt.NDArray[np.int32]) -> Doubles:
     count = int(tiles.max(initial=0)) + 1
     squares = np.square(values, dtype=np.float64)
     return np.stack([np.bincount(tiles, channel, count) for channel in squares])
-
-
-@lru_cache(maxsize=4)
-def _tiles(height: int, width: int) -> npt.NDArray[np.int32]:
-    """Return the index of the tile of each pixel, in row-major order."""
-    across = -(-width // TILE)
-    tiles = (np.arange(height) // TILE)[:, None] * across + np.arange(width) // TILE
-    return read_only(tiles.astype(np.int32).reshape(-1))
