@@ -223,6 +223,7 @@ class ParsedScene:
 
         other = copy(self)
         other.state = mi.parser.ParserState(self.state)
+        other.luminaires = dict(self.luminaires)
         return other
 
     def lights_alone(self) -> "ParsedScene":

@@ -6,7 +6,6 @@ lit is nearer than five times the luminous opening, the luminaire is a panel of 
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -108,7 +107,7 @@ def hang_luminaires(
     whole = {parsed.names[node] for node in chosen}
     further = {k: luminaire_of_spot(parsed.names[k]) for k in parsed.emitter_nodes}
     further = {k: name for k, name in further.items() if name in whole}
-    parsed = without_emitters(parsed, further.keys()) if further else _copied(parsed)
+    parsed = without_emitters(parsed, further.keys()) if further else parsed.copied()
     distances = _distances(parsed, chosen, up)
     for node, hanging in chosen.items():
         name, tilt = parsed.names[node], _tilt(parsed, node, hanging, up)
@@ -141,16 +140,6 @@ def hang_luminaires(
 def _element(parsed: ParsedScene, node: int) -> tuple[int, int]:
     """Return the file of an element, and the offset of its `<`."""
     return parsed.state.nodes[node].file_index, int(parsed.state.nodes[node].offset) - 1
-
-
-def _copied(parsed: ParsedScene) -> ParsedScene:
-    """Return a copy of a scene whose nodes may be changed."""
-    import mitsuba as mi
-
-    other = copy(parsed)
-    other.state = mi.parser.ParserState(parsed.state)
-    other.luminaires = dict(parsed.luminaires)
-    return other
 
 
 def _chosen(
