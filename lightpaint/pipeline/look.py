@@ -54,20 +54,9 @@ SOLVE_RESULTS = ("lighting.json", "predicted.exr", "comparison.png", "report.htm
 #: Files of each view, if there are several.
 VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html", "report.json")
 
-#: Files of a solve or a relight, which the next solve replaces.
-RESULTS = (
-    "lighting.json",
-    "predicted.exr",
-    "verified.exr",
-    "comparison.png",
-    "report.html",
-    "report.json",
-    "relit.xml",
-    "relit.png",
-    "relit.exr",
-    "relit.*.exr",
-    *EXPORTS,
-)
+#: Files of a relight; and of a solve or a relight, which the next solve replaces.
+RELIT_RESULTS = ("relit.xml", "relit.png", "relit.exr", "relit.*.exr")
+RESULTS = tuple(dict.fromkeys([*SOLVE_RESULTS, *VIEW_RESULTS, *RELIT_RESULTS, *EXPORTS]))
 
 #: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.
 LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
