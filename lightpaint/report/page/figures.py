@@ -11,7 +11,7 @@ from PIL import Image
 
 from lightpaint.arrays import Floats, largest
 from lightpaint.colour import ViewTransform, encode_display, to_8_bit
-from lightpaint.images import denoised
+from lightpaint.images import denoised, resampled
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import Solution
 from lightpaint.relit.verification import LIMIT, Verification
@@ -111,12 +111,7 @@ def resized(image: Floats, factor: float) -> Floats:
     pixel.
     """
     height, width = (max(1, round(side * factor)) for side in image.shape[:2])
-    box = Image.Resampling.BOX
-    planes = [
-        np.asarray(Image.fromarray(image[..., c].astype(np.float32)).resize((width, height), box))
-        for c in range(3)
-    ]
-    return np.stack(planes, axis=-1)
+    return resampled(image, (height, width))
 
 
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:

@@ -23,7 +23,7 @@ from lightpaint.colour import (
     photometry,
     to_8_bit,
 )
-from lightpaint.images import Estimate, covered, denoised, enlarged
+from lightpaint.images import Estimate, covered, denoised, enlarged, resampled
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import Appearance, Lighting, Solution
 from lightpaint.relit.verification import Verification
@@ -269,10 +269,7 @@ def _sized(image: Floats, width: int) -> Floats:
     height, wide = image.shape[:2]
     if wide <= width:
         return image
-    size, box = (width, max(1, round(height * width / wide))), Image.Resampling.BOX
-    planes = np.ascontiguousarray(np.moveaxis(image.astype(np.float32), -1, 0))
-    shrunk = [np.asarray(Image.fromarray(plane).resize(size, box)) for plane in planes]
-    return np.stack(shrunk, axis=-1)
+    return resampled(image, (max(1, round(height * width / wide)), width))
 
 
 def _wide(picture: Floats, width: int = THUMBNAIL_WIDTH) -> Floats:
