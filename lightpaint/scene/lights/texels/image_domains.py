@@ -153,15 +153,8 @@ class Sky(ImageDomain):
         """See ImageDomain."""
         columns, rows = size
         height, width = image.shape[:2]
-        y = np.linspace(0, height - 1, rows)
         x = (np.arange(columns) + 0.5) / columns * width - 0.5
-        top, left = np.clip(np.floor(y).astype(int), 0, max(height - 2, 0)), np.floor(x).astype(int)
-        below, beside = (y - top)[:, None, None], (x - left)[:, None]
-        lower, right = np.minimum(top + 1, height - 1), (left + 1) % width
-        left = left % width
-        upper_row = image[top][:, left] * (1 - beside) + image[top][:, right] * beside
-        lower_row = image[lower][:, left] * (1 - beside) + image[lower][:, right] * beside
-        return np.asarray(upper_row * (1 - below) + lower_row * below, np.float64)
+        return _around(image, x, np.linspace(0, height - 1, rows)[:, None])
 
     def seen(self, image: Floats, directions: Doubles) -> Doubles:
         """Return the radiance from directions in the light's own space, as Mitsuba interpolates it.
@@ -171,17 +164,25 @@ class Sky(ImageDomain):
         rows, columns = image.shape[:2]
         azimuth = np.arctan2(directions[..., 0], -directions[..., 2]) / (2 * np.pi)
         polar = np.arccos(np.clip(directions[..., 1], -1, 1)) / np.pi
-        x, y = azimuth * columns - 0.5, polar * (rows - 1)
-        left, top = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), rows - 2)
-        beside, below = (x - left)[..., None], (y - top)[..., None]
-        first, second = left % columns, (left + 1) % columns
-        upper = image[top, first] * (1 - beside) + image[top, second] * beside
-        lower = image[top + 1, first] * (1 - beside) + image[top + 1, second] * beside
-        return np.asarray(upper * (1 - below) + lower * below, np.float64)
+        return _around(image, azimuth * columns - 0.5, polar * (rows - 1))
 
     def picture_size(self, size: GridSize, width: int) -> GridSize:
         """See ImageDomain: twice as wide as high, whatever the texels."""
         return width, width // 2
+
+
+def _around(image: Floats, x: Doubles, y: Doubles) -> Doubles:
+    """Return an image between its pixels, whose columns wrap around, (..., 3).
+
+    image: (rows, columns, 3). x, y: columns and rows, (...) each when broadcast.
+    """
+    rows, columns = image.shape[:2]
+    left, top = np.floor(x).astype(int), np.clip(np.floor(y).astype(int), 0, max(rows - 2, 0))
+    beside, below = (x - left)[..., None], (y - top)[..., None]
+    first, second, lower = left % columns, (left + 1) % columns, np.minimum(top + 1, rows - 1)
+    above = image[top, first] * (1 - beside) + image[top, second] * beside
+    beneath = image[lower, first] * (1 - beside) + image[lower, second] * beside
+    return np.asarray(above * (1 - below) + beneath * below, np.float64)
 
 
 def solid_angles(size: GridSize) -> Doubles:
