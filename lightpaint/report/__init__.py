@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         LEAST_SHARE, ReportedAnswer, energy_shares, picture_errors,
     )
     from lightpaint.report.page.figures import data_uri, resized, thumbnail
-    from lightpaint.report.page.html import html
+    from lightpaint.report.page.html import html, script_json
     from lightpaint.report.page.limit_sections import closer_choice
     from lightpaint.report.page.mixer import (
         kelvin_colors, light_data, lighting_data, mixer_assets, mixer_html,

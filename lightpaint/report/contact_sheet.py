@@ -137,12 +137,7 @@ def light_sheet(
         draw.text((grid.gap, y), shorten_to_width(foot, small, room), FAINT, small)
     height = max(sheet.width - sheet.height - 1, PLAN_HEIGHT)
     plan = rig_drawing(basis.features, lights, up=up, width=sheet.width, height=height)
-    return np.asarray(sheet) if plan is None else _with_plan(np.asarray(sheet), plan)
-
-
-def _with_plan(sheet: npt.NDArray[np.uint8], plan: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Return the sheet with the plan below it."""
-    return np.concatenate([sheet, plan])
+    return np.concatenate([np.asarray(x) for x in (sheet, plan) if x is not None])
 
 
 def _lights_and_images(basis: Basis) -> list[int | LightImage]:

@@ -140,8 +140,8 @@ def gallery_page(
         title=visible(title),
         about=counts_text(rows),
         has_failed=any(row.state == "failed" for row in rows),
-        looks=Markup(script_json(records)),
-        transforms=Markup(script_json(transforms_of(finished_rows) if mixers else {})),
+        looks=report.script_json(records),
+        transforms=report.script_json(transforms_of(finished_rows) if mixers else {}),
         mixers=list(mixers.values()),
         places=places,
         style=Markup(styles(*STYLES)),
@@ -333,7 +333,7 @@ def _mixer(
         '<section class="mixer" data-ready data-basis="{}" hidden>'
         '<script type="application/json">{}</script></section>'
     )
-    return Markup(section).format(name, Markup(script_json(data)))
+    return Markup(section).format(name, report.script_json(data))
 
 
 def _strongest_lights(record: Mapping[str, Any], rows: Sequence[summary.SummaryRow]) -> list[int]:
@@ -360,12 +360,6 @@ def transforms_of(rows: Sequence[summary.SummaryRow]) -> dict[str, Any]:
         with suppress(LightpaintError):
             transforms.setdefault(name, report.transform_data(ViewTransform(name)))
     return transforms
-
-
-def script_json(record: Any) -> str:
-    """Return JSON for a script element, which only `<` can end, and which allows no escapes."""
-    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
 
 
 def planes_name(folder: Path, key: str) -> str:

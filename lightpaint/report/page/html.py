@@ -4,6 +4,7 @@ Each section has a template of Jinja2 in `templates/`, and its module finds the 
 `pieces.html` has the macros that they share.
 """
 
+import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
@@ -67,6 +68,12 @@ def breakable_name(name: str) -> Markup:
     """Return a name that may break after joining characters and in very long words."""
     words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
     return Markup("<wbr>").join(words)
+
+
+def script_json(record: Any) -> Markup:
+    """Return JSON for a script element, which only `<` can end, and which allows no escapes."""
+    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def name_list(names: Sequence[str]) -> Markup:

@@ -6,7 +6,6 @@ mix them, so that a page sent by mail is a mixer in any browser, offline.
 """
 
 import base64
-import json
 import re
 import zlib
 from collections.abc import Sequence
@@ -42,7 +41,7 @@ from lightpaint.progress import with_progress
 from lightpaint.report.answer_pictures import MixesOfBlocks
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
-from lightpaint.report.page.html import html
+from lightpaint.report.page.html import html, script_json
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
 from lightpaint.viewer import bundled, compact_script, source, styles
@@ -149,10 +148,7 @@ def mixer_html(
         "lighting": lighting_data(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
-    # In a script nothing is escaped, and only `<` can end it.
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    text = text.replace("<", "\\u003c")
-    return html("mixer", data=Markup(text))
+    return html("mixer", data=script_json(data))
 
 
 def mixer_assets() -> Markup:
