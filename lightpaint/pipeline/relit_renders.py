@@ -156,8 +156,9 @@ def write_final_png(path: Path, picture: FinalPicture, transform: ViewTransform)
 def frames_to_write(job: Job, text: str | None) -> tuple[int, ...]:
     """Return the frames that a job of a shot writes: those in `text`, and the painted ones.
 
-    text: as `parse_frames` reads it. Raises BasisError for frames of a job that is of no shot, and
-    OutputError for a file in the way.
+    text: as `parse_frames` reads it. Raises BasisError for frames of a job that is of no shot, or
+    of another size than the painted ones, ImageError for a frame without a header, and OutputError
+    for a file in the way.
     """
     if job.sequence is None:
         if text is not None:
@@ -166,6 +167,7 @@ def frames_to_write(job: Job, text: str | None) -> tuple[int, ...]:
     chosen = () if text is None else parse_frames(text, job.sequence)
     frames = tuple(sorted({*job.painted_frames, *chosen}))
     _check_pictures(job, frames)
+    _check_sizes(job, frames)
     return frames
 
 
@@ -240,6 +242,36 @@ def _check_pictures(job: Job, frames: Sequence[int]) -> dict[int, Path]:
     return pictures
 
 
+def _check_sizes(job: Job, frames: Sequence[int]) -> None:
+    """Raise BasisError if a frame differs in size from the first painted one, by their headers.
+
+    So a solve does not end in frames that it cannot write.
+    """
+    assert job.sequence is not None
+    painted = _size_in_header(job.sequence.path(job.painted_frames[0]))
+    for frame in frames:
+        path = job.sequence.path(frame)
+        size = _size_in_header(path)
+        if painted is not None and size is not None:
+            _check_size(path, size, painted)
+
+
+def _size_in_header(path: Path) -> tuple[int, int] | None:
+    """Return (height, width) of a frame; None for a folder without an EXR file."""
+    file = min(path.glob("*.exr"), default=None) if path.is_dir() else path
+    return None if file is None else formats.read_headers(file)[1]
+
+
+def _check_size(path: Path, size: tuple[int, int], painted: tuple[int, int]) -> None:
+    """Raise BasisError unless a frame has the (height, width) of the painted ones."""
+    if size != painted:
+        (height, width), (rows, columns) = size, painted
+        raise BasisError(
+            f"{path} is {width}x{height}, but the painted frames are {columns}x{rows}: the frames "
+            "of a shot must have the same size"
+        )
+
+
 def _groups_of(job: Job, frame: int) -> LightGroups:
     """Return the light groups of a frame, read now and not kept, in the way of the painted ones."""
     assert job.sequence is not None
@@ -248,13 +280,8 @@ def _groups_of(job: Job, frame: int) -> LightGroups:
         groups = replace(example, path=path).content
     else:
         groups = read_light_groups(path)
-    expected = groups.basis.size if job.groups is None else job.groups.basis.size
-    if groups.basis.size != expected:
-        (height, width), (rows, columns) = groups.basis.size, expected
-        raise BasisError(
-            f"{path} is {width}x{height}, but the painted frames are {columns}x{rows}: the frames "
-            "of a shot must have the same size"
-        )
+    if job.groups is not None:
+        _check_size(Path(path), groups.basis.size, job.groups.basis.size)
     return groups
 
 

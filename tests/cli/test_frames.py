@@ -238,7 +238,7 @@ def test_a_job_of_frames_can_be_sent(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
-    """It was relit at its own size, without a word."""
+    """It was relit at its own size, without a word; later it was refused, but after the solve."""
     shot(tmp_path)
     paint(tmp_path, 2, SET[0], "evening")
     images = pictures(seed=9, size=(6, 8))
@@ -248,3 +248,16 @@ def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
     assert completed.returncode == 2
     last = completed.stderr.splitlines()[-1]
     assert "shot.0003.exr is 8x6, but the painted frames are 16x12" in last
+    assert not (tmp_path / "evening" / "lighting.json").exists()
+    succeed(tmp_path, "solve", "shot.####.exr", "evening.0002.exr", "--frames", "1-2")
+
+
+def test_a_frame_that_is_cut_off_is_refused_before_the_solve(tmp_path: Path) -> None:
+    shot(tmp_path)
+    paint(tmp_path, 2, SET[0], "evening")
+    damaged = tmp_path / "shot.0004.exr"
+    damaged.write_bytes(damaged.read_bytes()[:100])
+    completed = run(tmp_path, "solve", "shot.####.exr", "evening.0002.exr", "--frames", "all")
+    assert completed.returncode == 2
+    assert "shot.0004.exr" in completed.stderr.splitlines()[-1]
+    assert not (tmp_path / "evening" / "lighting.json").exists()
