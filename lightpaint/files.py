@@ -227,8 +227,10 @@ def file_length(
             path,
             f" is {status.st_size} bytes long: no {kind} has more than {limit}, so it is not read",
         )
-    if status.st_size == 0 and (_is_virtual(status) or not may_be_empty):
-        raise error(path, f" is empty, or only made up when it is read: expected {article} {kind}")
+    if status.st_size == 0 and _is_virtual(status):
+        raise error(path, f" is made up by the system as it is read, and not {article} {kind}")
+    if status.st_size == 0 and not may_be_empty:
+        raise error(path, f" is empty: expected {article} {kind}")
     if is_sparse:
         raise error(
             path, f" is {status.st_size} bytes long, and nearly all of it was never written"

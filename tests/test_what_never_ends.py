@@ -34,8 +34,8 @@ AT_ONCE = 60
 REQUESTS = {
     "pipe": "is a device or a pipe",
     "/dev/zero": "is a device or a pipe",
-    "/proc/kmsg": "is empty, or only made up when it is read",
-    "/proc/kpagecount": "is empty, or only made up when it is read",
+    "/proc/kmsg": "is made up by the system as it is read",
+    "/proc/kpagecount": "is made up by the system as it is read",
     "folder": "folder",
     "sparse": "",
 }
@@ -281,7 +281,7 @@ def test_files_that_are_read_as_they_were(tmp_path: Path) -> None:
         files.read_bytes(path, "file", SceneError, limit=files.CHUNK)
     path.write_bytes(b"")
     assert files.read_bytes(path, "file", SceneError, may_be_empty=True) == b""
-    with pytest.raises(SceneError, match="a is empty, or only made up"):
+    with pytest.raises(SceneError, match=r"a is empty: expected a file$"):
         files.file_length(path, "file", SceneError)
 
 

@@ -142,6 +142,10 @@ def file_kind(path: Path) -> str:
     head = head_of(path, 128)
     if kind := kind_of(head):
         return kind if kind != "zip" else layered_kind(path, head)
+    if b"<scene" in head:
+        raise ImageError(
+            path, " is a scene, not a picture: name the scene first, then what is painted of it"
+        )
     name = name_of(head)
     raise ImageError(
         path,

@@ -485,6 +485,12 @@ def test_other_files(tmp_path: Path, content: bytes, kind_name: str):
         _read(tmp_path, content)
 
 
+def test_a_scene_in_place_of_a_picture(tmp_path: Path):
+    """Scene and painting exchanged: the scene was to be exported as OpenEXR."""
+    with pytest.raises(ImageError, match="painted is a scene, not a picture: name the scene first"):
+        _read(tmp_path, b'<?xml version="1.0"?>\n<scene version="3.0.0">\n</scene>')
+
+
 def test_no_file(tmp_path: Path):
     with pytest.raises(ImageError, match="no such image file"):
         read_picture(tmp_path / "none.png")

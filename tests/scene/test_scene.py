@@ -223,6 +223,16 @@ SEEN = NO_SENSOR.replace("<emitter", '<sensor type="perspective"/><emitter')
             '<shape type="ply"><string name="filename" value="gone.ply"/></shape></scene>',
             "gone.ply",
         ),
+        (
+            SEEN.replace(
+                "<emitter", '<shape type="disk" id="a"/><shape type="disk" id="a"/><emitter'
+            ),
+            'duplicate ID: "a" (the first is at line 1, col 53)',
+        ),
+        (
+            SEEN.replace("<emitter", '<shape type="disk"><ref id="oak"/></shape><emitter'),
+            'unresolved reference to "oak". Make sure',
+        ),
     ],
 )
 def test_what_cannot_be_loaded_is_refused_in_one_line(

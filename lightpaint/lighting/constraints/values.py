@@ -149,8 +149,13 @@ def parse_whites(table: Mapping[str, Any], where: SourceKey) -> colour.WhiteRang
 def _parse_kelvins(value: Any, where: SourceKey) -> list[float]:
     """Return one temperature, or both ends of a range."""
     ends = [value] if validation.is_number(value) else value
-    is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
-    if not is_range or not all(map(validation.is_number, ends)) or sorted(ends) != list(ends):
+    is_pair = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
+    is_range = is_pair and all(map(validation.is_number, ends))
+    if is_range and sorted(ends) != list(ends):
+        raise ConstraintError(
+            where, f" runs from {ends[0]:g} to {ends[1]:g} K: give the lower temperature first"
+        )
+    if not is_range:
         raise ConstraintError(
             where,
             f" is {value!r}: expected a temperature, 3200, or a range from low to high, "

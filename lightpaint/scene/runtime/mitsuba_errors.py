@@ -116,6 +116,8 @@ def _without_places(text: str, path: Path) -> str:
     text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", text)
     file = re.escape(str(path))
     text = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", text)
+    text = re.sub(rf"previous was at {file} \((line \d+, col \d+)\)", r"the first is at \1", text)
+    text = re.sub(r' in property "_arg_\d+"', "", text)  # a reference without a name
     text = re.sub(rf'Error while loading XML file "{file}": ', "", text)
     text = re.sub(rf'Parsing of XML file "{file}" failed', "it is not XML", text)
     return without_path(text, path)
