@@ -39,6 +39,7 @@ from lightpaint.lighting.analysis.appearance.display_difference import (
     object_with_most_error,
     place_with_most_error,
     undetermined_at,
+    untold_at,
 )
 from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     HEADLINE_SHARE,
@@ -97,9 +98,9 @@ class Appearance:
             if it is a part of the paint. "" if they are about all of it.
         compensating_lights: Lights that are down by two stops or more only to make up for what
             others spill on unpainted parts.
-        undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`), or not
-            well enough to tell what is missing at the place: what they could do is not known. Empty
-            if errors of lights were not computed.
+        undetermined_lights: Lights whose error may be what is missing at the place: all of it, or
+            a third if the samples do not determine them (`Uncertainty.untold`). What they could do
+            there is not known. Empty if errors of lights were not computed.
         is_painted_everywhere: Whether all of the picture is painted, so that nothing else can be.
 
     Examples:
@@ -374,15 +375,15 @@ def with_undetermined(
     appearance: Appearance, view: Solution, uncertainty: Uncertainty
 ) -> Appearance:
     """Return the appearance of a view with the lights that its samples do not determine."""
-    names = view.basis.names
-    untold = [x for x, is_so in zip(names, uncertainty.untold, strict=True) if is_so]
-    place = appearance.place
-    there = () if place is None else undetermined_at(view, place, uncertainty)
+    if (place := appearance.place) is None:
+        return appearance
+    there = undetermined_at(view, place, uncertainty)
+    untold = untold_at(view, place, uncertainty)
     return replace(
         appearance,
         # What its error may bring to the place, a light can bring there.
         local_lights=tuple(dict.fromkeys((*appearance.local_lights, *there))),
-        undetermined_lights=tuple(x for x in names if x in {*untold, *there}),
+        undetermined_lights=tuple(x for x in view.basis.names if x in {*untold, *there}),
     )
 
 

@@ -49,6 +49,10 @@ STEP = 2
 #: these in 95 of 100 cases.
 UNSEEN_PATHS = 3.0
 
+#: Share of what is missing at a place that an undetermined light may bring: with less, it is not
+#: the reason.
+UNTOLD_SHARE = 1 / 3
+
 #: Maximum number of values, pixels times lights, that suffice to find the light of one path.
 PATH_SAMPLE = 2**22
 
@@ -337,8 +341,35 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
 def undetermined_at(solution: Solution, place: Place, uncertainty: Uncertainty) -> tuple[str, ...]:
     """Return the lights whose error alone may be all that is missing at a place, or too much there.
 
-    A light of known weight takes no part, whatever the samples say of the others. Of a light that
-    these samples do not determine, more may reach the place than they have found there.
+    A light of known weight takes no part, whatever the samples say of the others.
+    """
+    missing, possible = _light_of_errors(solution, place, uncertainty)
+    lacking = abs(float(luminance(missing)))
+    names = solution.basis.names
+    return tuple(
+        name for name, x in zip(names, luminance(possible), strict=True) if x >= lacking > 0
+    )
+
+
+def untold_at(solution: Solution, place: Place, uncertainty: Uncertainty) -> tuple[str, ...]:
+    """Return the lights that the samples do not determine and whose error may be a third of what is
+    missing at a place, in the channel that lacks most.
+
+    The others hardly reach it, however bright they are.
+    """
+    missing, possible = _light_of_errors(solution, place, uncertainty)
+    channel = int(np.argmax(np.abs(missing)))
+    is_enough = possible[:, channel] >= UNTOLD_SHARE * abs(missing[channel])
+    return tuple(solution.basis.names[k] for k in np.flatnonzero(uncertainty.untold & is_enough))
+
+
+def _light_of_errors(
+    solution: Solution, place: Place, uncertainty: Uncertainty
+) -> tuple[Doubles, Doubles]:
+    """Return what a place lacks, (3,), negative where it is too bright, and what the error of each
+    light may bring to it or take from it, (n, 3) >= 0; both are 0 without paint there.
+
+    Of a light that the samples do not determine, more may reach the place than they have found.
     """
     top, left, bottom, right = place.box
     box, views = (slice(top, bottom), slice(left, right)), solution.problem.views
@@ -346,18 +377,17 @@ def undetermined_at(solution: Solution, place: Place, uncertainty: Uncertainty) 
     missed[at_least_mask(views)[box]] = np.maximum(missed[at_least_mask(views)[box]], 0)
     weight = solution.importance[box]
     if not weight.any():
-        return ()
+        return np.zeros(3), np.zeros_like(solution.weights)
     # Both are means over the paint of the same pixels: of other pixels, no error explains a miss.
-    missing = float(luminance(np.average(missed, axis=(0, 1), weights=_in_channels(weight))))
+    missing = np.average(missed, axis=(0, 1), weights=_in_channels(weight)).astype(np.float64)
     low, high = uncertainty.interval
-    errors = np.nan_to_num(high - solution.weights if missing > 0 else solution.weights - low)
+    is_dark = float(luminance(missing)) > 0
+    errors = np.nan_to_num(high - solution.weights if is_dark else solution.weights - low)
     reaching = _local_light(solution, place, weight)
     if uncertainty.untold.any():
         unseen = UNSEEN_PATHS * _light_of_paths(solution) / np.count_nonzero(weight)
         reaching[uncertainty.untold] += unseen[uncertainty.untold]
-    possible = luminance(errors * reaching)
-    names = solution.basis.names
-    return tuple(name for name, x in zip(names, possible, strict=True) if x >= abs(missing) > 0)
+    return missing, errors * reaching
 
 
 def _light_of_paths(solution: Solution) -> Doubles:
