@@ -189,8 +189,7 @@ def _add_wishes(
 def lit_case(case: photometry.LightCase, lights: Lights, reduction: Reduction) -> LitCase:
     """Return a case on `lights`. Raises ConstraintError if it names none, or an adjusted one."""
     lit = LitCase.of(case, lights)
-    movable = {light for knob in reduction.knobs for light in knob.lights}
-    if adjusted := [lights.names[k] for k in lit.lights.tolist() if k in movable]:
+    if adjusted := [lights.names[k] for k in lit.lights.tolist() if k in reduction.movable]:
         raise ConstraintError(
             f"case {case.name!r} sets {adjusted[0]!r}, which the solve adjusts: lock it in the "
             "lights file (lock = true)"
@@ -265,10 +264,9 @@ def watts_allowed(budget: photometry.PowerBudget, floor_m2: float) -> float | No
 
 def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> None:
     """Raise ConstraintError if the power of a lamp that may be on is unknown."""
-    movable = {light for knob in reduction.knobs for light in knob.lights}
     unknown = [
         names[k]
-        for k in sorted(movable)
+        for k in sorted(reduction.movable)
         if k not in reduction.lamps or any(x.watts is None for x in reduction.lamps[k].emitters)
     ]
     if unknown:

@@ -14,7 +14,6 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, release_freed_memory
 from lightpaint.colour import Lamp
-from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
@@ -134,7 +133,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
 def _solve_whole(problem: Problem, begin: Doubles) -> Solution:
     """Solve a problem with all its terms from weights (n, 3)."""
     if problem.is_linear:
-        return _solve_squares(problem, begin)
+        return _solution(solve_squares(problem, begin))
     blocks = _blocks_of(problem)
     mixed, reached = _solve_rounds(problem, begin, blocks)
 
@@ -160,7 +159,7 @@ def _solve_rounds(
     Also return, (n, 3), in which channels lights reach something.
     """
     # The literal squares come first; they also show what each light reaches.
-    all_lights = replace(problem, constraints=_without_sparse(problem.constraints))
+    all_lights = replace(problem, constraints=replace(problem.constraints, sparse=None))
     first = _solution(solve_mixed(replace(all_lights, loss=problem.squares), begin))
     reached = first.reached
     all_lights = all_lights.with_whites(first.problem.reduction)
@@ -195,9 +194,10 @@ def solve_again(solution: Solution, problem: Problem) -> Solution:
     than in the loss, and it knows only the lights that were chosen.
     """
     if problem.is_linear:
-        return _solve_squares(replace(problem, reduction=problem.full), solution.weights)
+        whole = replace(problem, reduction=problem.full)
+        return _solution(solve_squares(whole, solution.weights))
     assert solution.reweighting is not None
-    step = _solve_under_reduction(problem, solution.weights, solution.reached)
+    step = _solution(solve_linear(problem, solution.weights, solution.reached))
     certificate, reweighting = solution.certificate, solution.reweighting
     converged = step.certificate.converged and reweighting.converged
     history = {name: getattr(certificate, name) for name in ("curve", "rounds")}
@@ -209,21 +209,8 @@ def solve_tethered(solution: Solution, problem: Problem) -> Solution:
     """Solve `problem`, which differs from the problem of `solution` only in its tether."""
     if not problem.is_linear:
         return solve_again(solution, problem)
-    return replace(
-        _solve_under_reduction(problem, solution.weights, solution.reached), tried=solution.tried
-    )
-
-
-def _solve_squares(problem: Problem, start: Doubles) -> Solution:
-    """Solve the squares; with `sparse`, for the best lights alone."""
-    return _solution(solve_squares(problem, start))
-
-
-def _solve_under_reduction(
-    problem: Problem, start: Doubles, reached: Bools | None = None
-) -> Solution:
-    """Solve the squares under the current reduction. reached: as in `solve_linear`."""
-    return _solution(solve_linear(problem, start, reached))
+    step = _solution(solve_linear(problem, solution.weights, solution.reached))
+    return replace(step, tried=solution.tried)
 
 
 def _solution(answer: LinearAnswer[Problem]) -> Solution:
@@ -407,11 +394,6 @@ def _problem_of_blocks(
         noise_removed=1 - 1 / blocks.side**2,
         block_side=blocks.side,
     )
-
-
-def _without_sparse(constraints: Constraints) -> Constraints:
-    """Return the constraints without a limit on the number of lights."""
-    return replace(constraints, sparse=None) if constraints.sparse is not None else constraints
 
 
 def tie_frames(

@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import Lights
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.light_wishes import LightWish, WishedLight, check_powers
-from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
+from lightpaint.lighting.unknowns.lamp_parts import watts_of
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.photometry import Glare, GlareReading, PlaneReading
 
@@ -158,7 +158,7 @@ def planes_answer(
         for k, wish in enumerate(wished.wishes)
     )
     lights = wished.illuminance.lights
-    adjusted = tuple(sorted({k for knob in reduction.knobs for k in knob.lights}))
+    adjusted = tuple(sorted(reduction.movable))
     return PlanesAnswer(
         wished,
         weights,
@@ -207,16 +207,13 @@ def _power(reduction: Reduction, wished: WishedLight, weights: Doubles) -> float
         check_powers(reduction, wished.illuminance.lights.names, "")
     except ConstraintError:
         return None
-    return watts_of_fixed(weights, reduction.lamps)
+    return watts_of(weights, reduction.lamps)
 
 
 def _is_all_at_full(reduction: Reduction, weights: Doubles) -> bool:
     """Return whether no lamp could give more light."""
-    movable = {light for knob in reduction.knobs for light in knob.lights}
-    if not movable <= set(reduction.lamps):
-        return False
-    for light in movable:
-        lamp = reduction.lamps[light]
-        if (lamp.drives_for(weights[light]) < lamp.most * (1 - AT_FULL)).any():
-            return False
-    return bool(movable)
+    movable, lamps = reduction.movable, reduction.lamps
+    return bool(movable) and all(
+        k in lamps and (lamps[k].drives_for(weights[k]) >= lamps[k].most * (1 - AT_FULL)).all()
+        for k in movable
+    )

@@ -17,7 +17,6 @@ from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.light_wishes import WishedLight
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.progress import cancellation_check
@@ -169,15 +168,14 @@ def least_watts(wished: WishedLight, reduction: Reduction) -> Program:
     nothing meets are met as far as possible first.
     """
     shares = shares_given_up(wished, reduction)
-    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
     slack = wished.slack_of(shares)
-    program = _solve(wished, reduction, watts, slack, shares)
-    return replace(program, x=_evened(reduction, program, watts, slack))
+    program = _solve(wished, reduction, reduction.watts, slack, shares)
+    return replace(program, x=_evened(reduction, program, slack))
 
 
-def _evened(reduction: Reduction, program: Program, watts: Doubles, slack: Doubles) -> Doubles:
+def _evened(reduction: Reduction, program: Program, slack: Doubles) -> Doubles:
     """Return unknowns, (k,), near the least power whose drives are as even as they can be."""
-    rows, least = reduction.required
+    (rows, least), watts = reduction.required, reduction.watts
     power = float(watts @ program.x)
     lower, upper = reduction.lower, reduction.upper
     if not power or not np.isfinite(upper).all():
@@ -200,20 +198,11 @@ def shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
     largest once more, is least, so that no plane starves for a little more light on another. All
     are 0 if all wishes can be met.
     """
-    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
+    watts = reduction.watts
     if not watts.any():
         watts = np.abs(reduction.required[0]).sum(axis=0)
     costs = SECOND * watts / max(float(watts.max(initial=0)), 1e-300)
     return _solve(wished, reduction, costs, None, None).shares
-
-
-def power_of(reduction: Reduction, x: Doubles) -> float:
-    """Return the power in watts at unknowns x, (k,), with the power of lamps that stay as they
-    are."""
-    with_knobs = {light for knob in reduction.knobs for light in knob.lights}
-    fixed = {k: lamp for k, lamp in reduction.lamps.items() if k not in with_knobs}
-    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
-    return float(watts @ x) + watts_of_fixed(reduction.fixed_weights, fixed)
 
 
 def _solve(

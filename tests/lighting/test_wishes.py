@@ -16,14 +16,10 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.light_wishes import wished_light
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
+from lightpaint.lighting.unknowns.lamp_parts import watts_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wish_outcomes import planes_answer
-from lightpaint.lighting.wish_problems import (
-    least_watts,
-    power_of,
-    shares_given_up,
-    with_wishes,
-)
+from lightpaint.lighting.wish_problems import least_watts, shares_given_up, with_wishes
 from lightpaint.photometry.illuminance import (
     Illuminance,
     LightCase,
@@ -114,7 +110,7 @@ def test_the_least_power_is_that_of_all_rows_at_once(make_basis, seed):
         np.full(6, 40.0), A_ub=-rows, b_ub=-np.append(500.0, np.zeros(60)), bounds=(0, 1)
     )
     # One percent is spent on lamps that share the light more evenly than those of a corner do.
-    power = power_of(reduction, found.x)
+    power = watts_of(reduction.weights(found.x), reduction.lamps)
     assert expected.fun * (1 - SAME) <= power <= 1.01 * expected.fun * (1 + SAME)
     assert np.square(found.x).sum() <= np.square(expected.x).sum()
     assert (rows @ found.x >= np.append(500.0, np.zeros(60)) - 1e-5).all()
@@ -167,7 +163,8 @@ def test_a_budget_is_kept_where_light_is_given_up(make_basis):
     wished = wished_light(illuminance, PowerBudget(per_area=10.0), reduction, floor_m2=6.0)
     reduction = reduction.with_requirements(wished.requirements)
     found = least_watts(wished, reduction)
-    assert power_of(reduction, found.x) == pytest.approx(60.0, rel=SAME)
+    power = watts_of(reduction.weights(found.x), reduction.lamps)
+    assert power == pytest.approx(60.0, rel=SAME)
     assert shares_given_up(wished, reduction)[0] > 0
 
 

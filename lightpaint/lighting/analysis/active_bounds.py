@@ -70,13 +70,12 @@ class BoundedAnswer:
 
 def find_active_bounds(o: BoundedAnswer) -> Iterator[ActiveBound]:
     """Yield every bound that holds a light: zero, or a constraint."""
-    with_knob = {k for knob in o.reduction.knobs for k in knob.lights}
     for k, light in enumerate(o.basis.lights):
         if light.is_fixed:
             yield ActiveBound(
                 (k,), "kept", _release_estimate(o, (k,)), *_by_channel(o, k, 2 * o.gradient[k])
             )
-        elif k not in with_knob and o.is_active[k]:
+        elif k not in o.reduction.movable and o.is_active[k]:
             kind: Kind = "lock" if o.w[k].any() else "off"
             force = 2 * o.gradient[k]
             if kind == "off":  # which bounds it from above only

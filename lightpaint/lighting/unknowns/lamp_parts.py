@@ -33,8 +33,8 @@ def watts_of_unknowns(knobs: Sequence[Knob], lamps: Mapping[int, Lamp]) -> Doubl
     return np.array(powers)
 
 
-def watts_of_fixed(weights: Doubles, lamps: Mapping[int, Lamp]) -> float:
-    """Return the power of lights that stay at weights (n, 3)."""
+def watts_of(weights: Doubles, lamps: Mapping[int, Lamp]) -> float:
+    """Return the power of lamps at weights (n, 3) of all lights, in watts."""
     return sum(lamp.watts_for(weights[light]) or 0.0 for light, lamp in lamps.items())
 
 

@@ -87,6 +87,16 @@ class Reduction:
         return tuple(tuple(range(first, last)) for first, last in pairwise(ends))
 
     @cached_property
+    def movable(self) -> frozenset[int]:
+        """The lights, by their indices, that knobs move."""
+        return frozenset(light for knob in self.knobs for light in knob.lights)
+
+    @cached_property
+    def watts(self) -> Doubles:
+        """(k,), the power that each x takes at 1, in watts."""
+        return lamp_parts.watts_of_unknowns(self.knobs, self.lamps)
+
+    @cached_property
     def white_knobs(self) -> tuple[int, ...]:
         """Places of the knobs of lights that keep to a range of white, and may be on."""
         return tuple(
@@ -272,12 +282,9 @@ class Reduction:
             rows[:, columns] = parts
         least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
         if requirements.watts.any():
-            rows += np.outer(
-                requirements.watts, lamp_parts.watts_of_unknowns(self.knobs, self.lamps)
-            )
-            with_knobs = {light for knob in self.knobs for light in knob.lights}
-            fixed = {k: lamp for k, lamp in self.lamps.items() if k not in with_knobs}
-            least -= requirements.watts * lamp_parts.watts_of_fixed(self.fixed_weights, fixed)
+            rows += np.outer(requirements.watts, self.watts)
+            fixed = {k: lamp for k, lamp in self.lamps.items() if k not in self.movable}
+            least -= requirements.watts * lamp_parts.watts_of(self.fixed_weights, fixed)
         return rows, least
 
     @cached_property

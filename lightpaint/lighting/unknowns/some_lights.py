@@ -11,7 +11,7 @@ from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown
-from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
+from lightpaint.lighting.unknowns.lamp_parts import watts_of
 from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Number of knobs that are solved for together where no light depends on another one.
@@ -81,8 +81,8 @@ class SomeLights:
         by_own = np.einsum("mnc,nc->m", rows, shone)
         least = requirements.least - (reached - by_own)
         if requirements.watts.any():
-            least = least - requirements.watts * watts_of_fixed(weights, others)
-            by_own = by_own + requirements.watts * watts_of_fixed(shone, own)
+            least = least - requirements.watts * watts_of(weights, others)
+            by_own = by_own + requirements.watts * watts_of(shone, own)
         part = Requirements(rows, requirements.watts, np.minimum(least, by_own))
         return replace(self.reduction, lamps=own).with_requirements(part)
 
