@@ -13,8 +13,8 @@ Preference = Literal["watts", "white", "fewest", "rf"]
 if TYPE_CHECKING:
     # fmt: off
     from lightpaint.colour.color import (
-        C2, LUMINANCE, WHITE_DUV, cct_and_duv, ciede2000, delta_e, hex_to_rgb, hue_name,
-        kelvin_to_rgb, lab, lab_of_lights, luminance, matching_functions, rgb_to_hex,
+        C2, LUMINANCE, NAMED_DUV, WHITE_DUV, cct_and_duv, ciede2000, delta_e, hex_to_rgb,
+        hue_name, kelvin_to_rgb, lab, lab_of_lights, luminance, matching_functions, rgb_to_hex,
         uv_of_black_body, xy_of, xy_of_spectrum, xyz_of,
     )
     from lightpaint.colour.color_ranges import (

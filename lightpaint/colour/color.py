@@ -50,8 +50,11 @@ _MATRIX = np.array(
     ]
 )
 
+#: |Duv| beyond which people see a colour, and a colour temperature says nothing of it.
+WHITE_DUV = 0.02
+
 #: Maximum distance from Planck's locus, and minimum temperature, of light that is called white.
-WHITE_DUV, WARMEST = 0.015, 2100.0
+NAMED_DUV, WARMEST = 0.015, 2100.0
 
 #: Temperatures in kelvin below which white is warm, and above which it is cool.
 WARM, COOL = 3700.0, 7500.0
@@ -320,7 +323,7 @@ def hue_name(rgb: Floats) -> str:
     """
     scaled_rgb = np.asarray(rgb, np.float64) / np.max(rgb)
     temperature = cct_and_duv(scaled_rgb)
-    if temperature is not None and abs(temperature[1]) <= WHITE_DUV and temperature[0] >= WARMEST:
+    if temperature is not None and abs(temperature[1]) <= NAMED_DUV and temperature[0] >= WARMEST:
         return (
             "warm white"
             if temperature[0] < WARM

@@ -17,7 +17,13 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.colour import Preference
-from lightpaint.colour.color import cct_and_duv, ciede2000, lab_of_lights, luminance
+from lightpaint.colour.color import (
+    WHITE_DUV,
+    cct_and_duv,
+    ciede2000,
+    lab_of_lights,
+    luminance,
+)
 from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.colour.rendering_indices import (
     MARGIN,
@@ -35,9 +41,8 @@ MAX_EMITTERS, MAX_SLOTS = 10, 40
 #: Round-off of drives, relative to their range, and of a determinant relative to its columns.
 ROUND_OFF, SINGULAR = 1e-7, 1e-6
 
-#: The least colour temperature of a white emitter, in kelvin, and the largest Duv: amber LEDs are
-#: warmer, lime ones farther from Planck's locus.
-WARMEST_WHITE, WHITE_DUV = 2200.0, 0.02
+#: The least colour temperature of a white emitter, in kelvin: amber LEDs are warmer.
+WARMEST_WHITE = 2200.0
 
 #: Share of the largest brightness at which no bound restricts the mixes of a colour, and steps of
 #: the search for the largest at which a mix renders colours well enough.

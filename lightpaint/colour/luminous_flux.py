@@ -18,13 +18,10 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.color import cct_and_duv, luminance, rgb_to_hex
+from lightpaint.colour.color import WHITE_DUV, cct_and_duv, luminance, rgb_to_hex
 
 #: Luminous counterparts of emission units. Multiples of a scene's emission have none.
 LUMINOUS_UNITS = {"W/(m² sr)": "cd/m²", "W/sr": "cd", "W/m²": "lx"}
-
-#: |Duv| beyond which people see a colour, and a colour temperature says nothing of it.
-WHITE_DUV = 0.02
 
 #: Widest cone that Mitsuba's spot has, in degrees from its axis.
 WIDEST = 89.0

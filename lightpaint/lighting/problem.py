@@ -201,7 +201,7 @@ class Problem(linear_problem.LinearProblem):
         check = cancellation_check()  # each step of a painting of many layers takes a while
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
         check()
-        squares, loss = _losses(views, whole, fit)
+        pictures = _pictures(whole, views, fit)
         check()
         reference = start_weights(all_constraints.start, whole.lights)
         reading = ViewsReading(views, whole.power, reference, fit, all_constraints)
@@ -211,11 +211,7 @@ class Problem(linear_problem.LinearProblem):
         whites = linear_problem.whites_for(terms.expected, fit)
         reduction = linear_problem.reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
-            basis=whole,
-            views=views,
-            loss=loss,
-            squares=squares,
-            equations=NormalEquations.of(whole, squares.image, squares.weight),
+            **pictures,
             constraints=all_constraints,
             reduction=reduction,
             full=reduction,
@@ -309,9 +305,7 @@ class Problem(linear_problem.LinearProblem):
             raise TargetError(f"{len(images)} images for {len(self.views)} views: give one each")
         targets = zip(self.views.targets, images, strict=True)
         views = Views(self.views.bases, tuple(replace(x, image=image) for x, image in targets))
-        squares, loss = _losses(views, self.basis, self.fit)
-        equations = NormalEquations.of(self.basis, squares.image, squares.weight)
-        return replace(self, views=views, squares=squares, loss=loss, equations=equations)
+        return replace(self, **_pictures(self.basis, views, self.fit))
 
     def view_problem(self, k: int) -> "Problem":
         """Return the problem of view k alone: its pixels of the same squares."""
@@ -353,24 +347,14 @@ def problem_as_given(problem: Problem) -> Problem:
 def _with_bases(problem: Problem, bases: Sequence[Basis]) -> Problem:
     """Return the same demands on other planes of the same lights. bases: of each view."""
     whole, parts = joint_basis(bases)
-    views = Views(parts, problem.views.targets)
-    squares, loss = _losses(views, whole, problem.fit)
-    equations = NormalEquations.of(whole, squares.image, squares.weight)
-    return replace(
-        problem,
-        basis=whole,
-        views=views,
-        squares=squares,
-        loss=loss,
-        equations=equations,
-        reduction=problem.full,
-        corrected=None,
-        noise_removed=0.0,
-    )
+    pictures = _pictures(whole, Views(parts, problem.views.targets), problem.fit)
+    return replace(problem, **pictures, reduction=problem.full, corrected=None, noise_removed=0.0)
 
 
-def _losses(views: Views, whole: Basis, fit: Fit) -> tuple[Squares, Loss]:
-    """Return the literal squares of the paintings, and the loss of a picture."""
+def _pictures(whole: Basis, views: Views, fit: Fit) -> dict[str, Any]:
+    """Return the fields of a problem that follow from its pictures: bases, paintings, the loss,
+    and the literal squares with their equations.
+    """
     squares = painting.joint_squares(views, unpainted=painting.unpainted_weight_of(views, fit))
     loss = painting.choose_loss(
         squares,
@@ -379,7 +363,14 @@ def _losses(views: Views, whole: Basis, fit: Fit) -> tuple[Squares, Loss]:
         painted=lambda: painting.target_light(views),
         current=lambda: whole.current_look,
     )
-    return squares, loss
+    equations = NormalEquations.of(whole, squares.image, squares.weight)
+    return {
+        "basis": whole,
+        "views": views,
+        "loss": loss,
+        "squares": squares,
+        "equations": equations,
+    }
 
 
 def _resolve_views(

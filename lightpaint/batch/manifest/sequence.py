@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.batch.manifest.keys import Space, with_emission
-from lightpaint.colour import WHITE_DUV, cct_and_duv, kelvin_to_rgb, luminance
+from lightpaint.colour import NAMED_DUV, cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.lighting import Lighting, LightSetting
@@ -123,7 +123,7 @@ def _mix_hues(first: Doubles, second: Doubles, share: float) -> Doubles:
     at equal lightness, so that the mix does not depend on their brightness.
     """
     whites = [cct_and_duv(rgb) for rgb in (first, second)]
-    if all(white is not None and abs(white[1]) <= WHITE_DUV for white in whites):
+    if all(white is not None and abs(white[1]) <= NAMED_DUV for white in whites):
         (kelvin, duv), (kelvin_, duv_) = whites  # type: ignore[misc]
         mired = (1 - share) * 1e6 / kelvin + share * 1e6 / kelvin_
         return kelvin_to_rgb(1e6 / mired, (1 - share) * duv + share * duv_)

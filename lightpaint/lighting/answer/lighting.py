@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint import colour
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
-from lightpaint.basis import Basis, BasisLight, Lights
+from lightpaint.basis import Basis, Lights
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, brief, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError
@@ -488,17 +488,29 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         check_shape("weights", weights, (count, 3), "a row per light", error=LightingError)
         is_reached = np.ones((count, 3), dtype=bool) if reached is None else reached
         check_shape("reached", is_reached, (count, 3), "a row per light", error=LightingError)
+        columns = lights, map(as_rgb, weights), labels or [("", False)] * count, is_reached.tolist()
         settings = tuple(
-            _setting(
-                light,
-                as_rgb(weight),
-                label,
-                (bool(channels[0]), bool(channels[1]), bool(channels[2])),
-                (lamps or {}).get(k),
-                (mixed_emissions or {}).get(k),
+            # One unit of weight is unit-white emission, so that here the two are the same numbers.
+            LightSetting(
+                light.name,
+                light.plugin,
+                light.parameter,
+                light.unit,
+                emission=weight,
+                weight=weight,
+                is_fixed=light.is_fixed,
+                members=light.members,
+                unit_flux=light.unit_flux,
+                constraint=constraint,
+                is_active=is_active,
+                reached=(red, green, blue),
+                lamp=(lamps or {}).get(k),
+                is_outside_gamut=light.is_outside_gamut,
+                part_of=light.lamp,
+                mixed_emission=(mixed_emissions or {}).get(k),
             )
-            for k, (light, weight, label, channels) in enumerate(
-                zip(lights, weights, labels or [("", False)] * count, is_reached, strict=True)
+            for k, (light, weight, (constraint, is_active), (red, green, blue)) in enumerate(
+                zip(*columns, strict=True)
             )
         )
         return cls(settings, **fields)
@@ -535,35 +547,6 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                     f"{some_names(light.members)} in the basis"
                 )
         return np.array([by_name[name] for name in lights.names], dtype=np.float64)
-
-
-def _setting(
-    light: BasisLight,
-    weight: RGB,
-    label: tuple[str, bool],
-    reached: tuple[bool, bool, bool],
-    lamp: colour.Lamp | None,
-    mixed_emission: RGB | None,
-) -> LightSetting:
-    # One unit of weight is unit-white emission, so that here the two are the same numbers.
-    return LightSetting(
-        light.name,
-        light.plugin,
-        light.parameter,
-        light.unit,
-        emission=weight,
-        weight=weight,
-        is_fixed=light.is_fixed,
-        members=light.members,
-        unit_flux=light.unit_flux,
-        constraint=label[0],
-        is_active=label[1],
-        reached=reached,
-        lamp=lamp,
-        is_outside_gamut=light.is_outside_gamut,
-        part_of=light.lamp,
-        mixed_emission=mixed_emission,
-    )
 
 
 def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis import Basis, BasisLight, Lights, light_images
-from lightpaint.colour import cct_and_duv
+from lightpaint.colour import WHITE_DUV, cct_and_duv
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.images import Estimate
@@ -27,9 +27,6 @@ LAMP_KELVINS = (2200, 9000)
 
 #: Whites that the range is widened to where warmer or bluer ones are painted, up to moonlight.
 WARMER_KELVINS, BLUER_KELVINS = (2000.0,), (12_000.0, 16_000.0, 20_000.0, 25_000.0)
-
-#: Largest distance from Planck's locus at which a painted colour is a white.
-WHITE_DUV = 0.02
 
 #: Ratio by which a range reaches beyond the mean white that is painted.
 BEYOND_MEAN = 1.1

@@ -364,8 +364,7 @@ def joint_pull(
         power, reference, fit, near=constraints.near, painted_share=painted_share
     )
     prior = image_prior(lights, power, fit, painted_share, terms.expected)
-    parts = (pull, near, prior, terms.contrast, terms.restraint, tether, holding)
-    return _sum(*parts)
+    return _sum(pull, near, prior, terms.contrast, terms.restraint, tether, holding)
 
 
 def _sum(*terms: NormalEquations | None) -> NormalEquations | None:
@@ -391,18 +390,13 @@ def weight_pull(
     pixels, which scales the pull to the current colours. keeps_color: (n,), lights to which that
     pull applies. expected: the lights that the painting lets one expect; None for the current ones.
     """
-    gentle = fit.brightness * painted_share if fit.colors == "gentle" else 0.0
-    added = (
-        [pull_to_current(prefer_current * fit.brightness * power, current)]
-        if prefer_current
-        else []
-    )
-    if gentle:
+    to_current, to_colors = prefer_current * fit.brightness, None
+    if fit.colors == "gentle" and (gentle := fit.brightness * painted_share):
         expected = expected or expected_lights.ExpectedLights.unchanged(current)
         strength = COLOR_PULL + expected.clarity * (CLEAR_PULL - COLOR_PULL)
         strength *= gentle * dimming_factors(current, expected.emission)
-        added.append(pull_to_colors(strength[:, None] * power, current, keeps_color))
-    return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
+        to_colors = pull_to_colors(strength[:, None] * power, current, keeps_color)
+    return _sum(pull_to_current(to_current * power, current) if to_current else None, to_colors)
 
 
 def dimming_factors(current: Doubles, weights: Doubles) -> Doubles:

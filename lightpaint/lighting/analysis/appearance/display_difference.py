@@ -14,7 +14,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, as_rgb
 from lightpaint.basis import Basis, Planes, light_images, thinned
 from lightpaint.colour import LUMINANCE, ViewTransform, ciede2000, lab, luminance
-from lightpaint.images import Objects
+from lightpaint.images import Objects, block_sums, enlarged
 from lightpaint.lighting.analysis.diagnosis import REGIONS, Place, WorstRegion
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.constraints.light_constraints import ConstraintKind, ConstraintsByLight
@@ -187,8 +187,7 @@ class PaintComparison:
     def spread_blocks(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the block's value, of (rows, columns), for each painted pixel, (p,)."""
         height, width = self.weight.shape
-        tall = values.repeat(BLOCK, axis=0)[:height]
-        return np.asarray(tall.repeat(BLOCK, axis=1)[:, :width][self.counts])
+        return np.asarray(enlarged(values, BLOCK)[:height, :width][self.counts])
 
     @cached_property
     def block_weights(self) -> Doubles:
@@ -198,8 +197,7 @@ class PaintComparison:
     def _sums(self, values: Doubles) -> Doubles:
         image = np.zeros((*self.weight.shape, *values.shape[1:]))
         image[self.counts] = values
-        rows, columns = (_starts(length) for length in self.weight.shape)
-        return np.asarray(np.add.reduceat(np.add.reduceat(image, rows, 0), columns, 1))
+        return block_sums(image, BLOCK)
 
     def box(self, row: int, column: int) -> tuple[int, int, int, int]:
         """Return top, left, bottom and right of a block, in pixels of the whole picture."""
@@ -207,10 +205,6 @@ class PaintComparison:
         ends = zip((top, left), self.weight.shape, strict=True)
         bottom, right = (self.step * min(start // self.step + BLOCK, n) for start, n in ends)
         return top, left, bottom, right
-
-
-def _starts(length: int) -> npt.NDArray[np.int_]:
-    return np.arange(0, length, BLOCK)
 
 
 def object_with_most(

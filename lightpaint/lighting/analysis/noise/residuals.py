@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.images import bands_of, box_mean, enlarged, film_filtered
+from lightpaint.images import bands_of, block_sums, box_mean, enlarged, film_filtered
 from lightpaint.lighting.loss.pixel_loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution
 
@@ -174,9 +174,9 @@ def _tap_sums(
         products[shifted] -= pairs
     own = slice(rows.start - first, min(rows.stop, height) - first)
     return (
-        _block_sums(whole[own].astype(np.float64)),
-        _block_sums(products[own]),
-        _block_sums(np.abs(a[own])),
+        block_sums(whole[own], BLOCK),
+        block_sums(products[own], BLOCK),
+        block_sums(np.abs(a[own]), BLOCK),
     )
 
 
@@ -210,12 +210,6 @@ def distant_windows(distance: int) -> Iterator[tuple[tuple[slice, slice], tuple[
     yield (first, whole), (last, whole)
     yield (first, first), (last, last)
     yield (first, last), (last, first)
-
-
-def _block_sums(image: Doubles) -> Doubles:
-    """Return the sum over each block; the last ones may be cut."""
-    rows, columns = (np.arange(0, length, BLOCK) for length in image.shape)
-    return np.asarray(np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1))
 
 
 @dataclass(frozen=True)
