@@ -163,8 +163,8 @@ def _add_wishes(
     mean = matrix.mean(axis=0, keepdims=True)
     values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
     point_error = photometry.relative_intervals(values, errors)[:, None, None]
-    mean_error = reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
-    sure_mean = mean * (1 - min(mean_error, photometry.NORMAL_95 * photometry.LARGEST_ERROR))
+    largest = photometry.NORMAL_95 * photometry.LARGEST_ERROR
+    sure_mean = mean * (1 - min(reading.relative_interval, largest))
     size = wishes.mean or max(reading.mean, 1e-9)
     if wishes.mean is not None:
         rows.add("mean", name, wishes.mean, sure_mean, wishes.mean, size=wishes.mean)

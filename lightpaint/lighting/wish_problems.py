@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices
+from lightpaint.arrays import Doubles
 from lightpaint.errors import LightpaintError
+from lightpaint.lighting.algebra.quadratic import cap_rows
 from lightpaint.lighting.algebra.required_sums import RequiredSums
 from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.light_wishes import WishedLight
@@ -231,10 +232,13 @@ def _solve(
             np.concatenate([reduction.upper, np.ones(given.shape[1])]),
         ]
     )
-    used = [k for wish in wished.wishes if _length(wish.rows) == 1 for k in _places(wish.rows)]
-    fixed_rows, fixed_least = _cap_rows(reduction, columns.shape[1])
+    used = [x.rows.start for x in wished.wishes if x.rows.stop - x.rows.start == 1]
+    fixed_rows, fixed_least = cap_rows(reduction.caps, columns.shape[1])
+    is_limit = np.isfinite(fixed_least)
+    fixed_rows, fixed_least = fixed_rows[is_limit], fixed_least[is_limit]
     if slack is None:
-        largest = np.hstack([np.zeros((len(wished.wishes), count)), _at_least_each(wished)])
+        w = len(wished.wishes)
+        largest = np.hstack([np.zeros((w, count)), -np.eye(w), np.ones((w, 1))])
         fixed_rows = np.vstack([fixed_rows, largest])
         fixed_least = np.append(fixed_least, np.zeros(len(largest)))
     check = cancellation_check()
@@ -273,30 +277,3 @@ def _linprog(
             "watts, or lower limits that keep lamps on"
         )
     return np.asarray(found.x), -np.asarray(found.ineqlin.marginals)
-
-
-def _cap_rows(reduction: Reduction, columns: int) -> tuple[Doubles, Doubles]:
-    """Return limits on sums of a lamp's unknowns as rows, at least as large as (c,)."""
-    rows, least = list[Doubles](), list[float]()
-    for cap in reduction.caps:
-        row = np.zeros(columns)
-        row[list(cap.unknowns)] = cap.coefficients
-        for sign, limit in ((1, cap.lower), (-1, cap.upper)):
-            if np.isfinite(limit):
-                rows.append(sign * row)
-                least.append(sign * limit)
-    return np.array(rows).reshape(-1, columns), np.array(least)
-
-
-def _at_least_each(wished: WishedLight) -> Doubles:
-    """Return rows, (w, w + 1), that are >= 0 where the last number is the largest."""
-    count = len(wished.wishes)
-    return np.hstack([-np.eye(count), np.ones((count, 1))])
-
-
-def _length(rows: slice) -> int:
-    return int(rows.stop - rows.start)
-
-
-def _places(rows: slice) -> Indices:
-    return np.arange(rows.start, rows.stop)

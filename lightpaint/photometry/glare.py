@@ -147,7 +147,7 @@ class Glare:
         return GlareReading(
             8 * math.log10(0.25 / background * total),
             PER_E_FOLD * eye.mean_error / eye.mean,
-            PER_E_FOLD * eye.mean_interval / eye.mean,
+            PER_E_FOLD * eye.relative_interval,
             background,
             str(names[k]),
             float(self.sources.solid_angle[observer, k]),

@@ -260,6 +260,11 @@ class PlaneReading:
         return _student(self.points) * self.mean_error
 
     @property
+    def relative_interval(self) -> float:
+        """The same, relative to the mean; 0 without light."""
+        return self.mean_interval / self.mean if self.mean > 0 else 0.0
+
+    @property
     def uniformity_interval(self) -> float:
         """Half of the 95 % interval of the uniformity, without its bias."""
         return _student(self.points) * self.uniformity_error

@@ -25,7 +25,7 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.photometry.glare import Glare, GlareObserver, GlareSources, position_index
-from lightpaint.photometry.illuminance import Illuminance, MeasuringPlane, PlaneReading, floored
+from lightpaint.photometry.illuminance import Illuminance, MeasuringPlane, floored
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.scene import ENVIRONMENTS, Emitter, MeasuringPoints, Scene
 from lightpaint.validation import Check, between, number
@@ -282,7 +282,8 @@ def measure_glare(
 
     def excess_of(background: Illuminance) -> float:
         judged = weights_on(background.lights) if weights is None else weights
-        return max(map(_relative_interval, background.readings(judged).values())) / error
+        readings = background.readings(judged).values()
+        return max(x.relative_interval for x in readings) / error
 
     background = measured_until(
         at_eyes,
@@ -295,10 +296,6 @@ def measure_glare(
         progress=progress,
     )
     return Glare(tuple(observers), sources, background)
-
-
-def _relative_interval(reading: PlaneReading) -> float:
-    return reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
 
 
 def _eye(observer: GlareObserver) -> MeasuringPlane:

@@ -519,10 +519,10 @@ def detection_power(
     for k, name in enumerate(lights.names):
         by_light = _two_sided(float(mean_shifts[k]), float(limits[k]))
         by_sum = _two_sided(float(np.max(np.abs(error * lights.sums[k]) / deviation)), limit)
-        blocks_and_noise = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
-        power: Doubles = error**2 * (
-            np.square(blocks_and_noise[0]) - np.square(blocks_and_noise[1])
+        of_blocks, of_noise = (
+            np.square(x[k], dtype=np.float64) for x in (lights.blocks, lights.noise)
         )
+        power = error**2 * (of_blocks - of_noise)
         mean = max(float((weight[..., None] * power).sum()), 0.0)
         variance = max(float((np.square(weight)[..., None] * 4 * blocks * power).sum()), 0.0)
         by_pattern = NORMAL.cdf((mean - limit * spread**0.5) / (spread + variance) ** 0.5)

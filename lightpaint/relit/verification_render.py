@@ -201,16 +201,18 @@ def can_tell(
     ):
         return True
     shares = lights.luminance()
-    power = verification.detection_power(predicted, verified, lights, tests, limit=limit)
-    weak_shares = [share for name, share in shares.items() if power[name] < verification.LOW_POWER]
+
+    def shares_unseen(render: Estimate, tests: verification.LightTests) -> list[float]:
+        power = verification.detection_power(predicted, render, lights, tests, limit=limit)
+        return [share for name, share in shares.items() if power[name] < verification.LOW_POWER]
+
+    weak_shares = shares_unseen(verified, tests)
     if sum(weak_shares) <= 1 - CHECKED and max(weak_shares, default=0.0) < LARGE_SHARE:
         return True
     # With all samples, the noise of the render would be lower by this factor.
     at_end = Estimate(verified.image, verified.half_difference * done**0.5)
     tests = verification.light_tests(predicted, at_end, lights.blocks, lights.noise)
-    power = verification.detection_power(predicted, at_end, lights, tests, limit=limit)
-    later = [share for name, share in shares.items() if power[name] < verification.LOW_POWER]
-    return sum(weak_shares) - sum(later) < UNCHECKED
+    return sum(weak_shares) - sum(shares_unseen(at_end, tests)) < UNCHECKED
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.bordered_factor import BorderedFactor
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.optimum import NO_CAPS, Optimum
-from lightpaint.lighting.algebra.quadratic import EPSILON, Cap, Quadratic, kkt_residual
+from lightpaint.lighting.algebra.quadratic import EPSILON, Cap, Quadratic, cap_rows, kkt_residual
 from lightpaint.lighting.algebra.symmetric_matrices import BlockMatrix, large_libraries
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread
@@ -182,7 +182,8 @@ class DualActiveSet:
         self._lower, self._upper = lower * self._root, upper * self._root
         self._is_fixed = self._lower >= self._upper
         self._rows, self._count = rows, len(least)
-        self._cap_rows, cap_least = _cap_sums(caps, self._root)
+        self._cap_rows, cap_least = cap_rows(caps, len(M))
+        self._cap_rows /= self._root
         self._least = np.concatenate([least, cap_least])
         self._factor = BorderedFactor(whole, parts or [np.arange(len(M))])
         self._sums = _CountedSums(len(M))
@@ -559,15 +560,3 @@ class DualActiveSet:
             optimum, x=value, multipliers=gradient, cap_multipliers=at_least - at_most
         )
         return unscaled, multipliers[: self._count]
-
-
-def _cap_sums(caps: Sequence[Cap], root: Doubles) -> tuple[Doubles, Doubles]:
-    """Return caps as sums that are at least as large as given values: their lower limits, then
-    their upper ones, (2 c, k) and (2 c,), in scaled unknowns.
-    """
-    rows = np.zeros((len(caps), root.size))
-    for row, cap in zip(rows, caps, strict=True):
-        row[list(cap.unknowns)] = cap.coefficients
-    rows /= root
-    lower, upper = (np.array([getattr(cap, x) for cap in caps]) for x in ("lower", "upper"))
-    return np.concatenate([rows, -rows]), np.concatenate([lower, -upper])

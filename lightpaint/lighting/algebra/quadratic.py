@@ -5,6 +5,7 @@
 The limits a_k, "caps", have positive coefficients and share no unknown.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,17 @@ class Cap:
     coefficients: tuple[float, ...]
     lower: float = -np.inf
     upper: float = np.inf
+
+
+def cap_rows(caps: Sequence[Cap], count: int) -> tuple[Doubles, Doubles]:
+    """Return caps on `count` unknowns as sums that are at least as large as given values: their
+    lower limits, then their upper ones, (2 c, count) and (2 c,).
+    """
+    rows = np.zeros((len(caps), count))
+    for row, cap in zip(rows, caps, strict=True):
+        row[list(cap.unknowns)] = cap.coefficients
+    lower, upper = (np.array([getattr(cap, x) for cap in caps]) for x in ("lower", "upper"))
+    return np.concatenate([rows, -rows]), np.concatenate([lower, -upper])
 
 
 @dataclass(frozen=True)

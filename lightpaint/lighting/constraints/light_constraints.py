@@ -51,8 +51,14 @@ ConstraintKind = Literal[
     "planes",
 ]
 
-#: The constraints on all lights together.
-ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near", "planes")
+#: The constraints on all lights together: the field of each in `Constraints`, and its value
+#: without one.
+ALL_LIGHTS_KINDS: Mapping[ConstraintKind, tuple[str, Any]] = {
+    "sparse": ("sparse", None),
+    "prefer_current": ("prefer_current", 0.0),
+    "near": ("near", 0.0),
+    "planes": ("requirements", None),
+}
 
 #: Kinds of constraints on single lights.
 SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour", "emitters")
@@ -332,10 +338,8 @@ class ConstraintsByLight:
         by_kind["emitters"] = tuple(k for k in by_kind["emitters"] if not self.lights[k].lamp)
         by_kind["tie"] = tuple(sorted(tied))
         all_lights = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
-        by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()
-        by_kind["prefer_current"] = all_lights if self.constraints.prefer_current else ()
-        by_kind["near"] = all_lights if self.constraints.near else ()
-        by_kind["planes"] = all_lights if self.constraints.requirements else ()
+        for kind, (name, nothing) in ALL_LIGHTS_KINDS.items():
+            by_kind[kind] = all_lights if getattr(self.constraints, name) != nothing else ()
         return {kind: table for kind, table in by_kind.items() if table}
 
     def units(self, lights: Sequence[int]) -> list[list[int]]:
@@ -350,14 +354,9 @@ class ConstraintsByLight:
         self, kind: ConstraintKind, lights: Collection[int]
     ) -> constraint_table.Constraints:
         """Return the constraints without one kind, for lights at these places."""
-        if kind == "sparse":
-            return replace(self.constraints, sparse=None)
-        if kind == "prefer_current":
-            return replace(self.constraints, prefer_current=0.0)
-        if kind == "near":
-            return replace(self.constraints, near=0.0)
-        if kind == "planes":
-            return replace(self.constraints, requirements=None)
+        if kind in ALL_LIGHTS_KINDS:
+            name, nothing = ALL_LIGHTS_KINDS[kind]
+            return replace(self.constraints, **{name: nothing})
         if kind == "tie":
             tied = tied_lights(self.constraints, self.lights)
             removed = {id(tied[k][0]) for k in lights}
