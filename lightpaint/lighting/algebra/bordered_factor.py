@@ -11,7 +11,7 @@ Murray, Saunders, Wright, SIAM Review 33, 1991: Schur complement methods). Its c
 the factor once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class BorderedFactor:
         self._base = np.zeros(len(M), bool)
         self._rows = np.zeros(0, np.intp)
         self._factor = BlockFactor(0, ())
-        self._border = _Border(0, 0)
+        self._border = Border(0, 0)
 
     def solve(
         self, free: Bools, right: Doubles, sums: Doubles, which: Indices, least: Doubles
@@ -90,7 +90,7 @@ class BorderedFactor:
         self._factor = BlockFactor(begin, factors)
         self._rows = np.concatenate(rows)
         room = sums + max(LEAST_COLUMNS, int(COLUMN_SHARE * begin))
-        self._border = _Border(begin, room)
+        self._border = Border(begin, room)
         return True
 
     def _places(self, sums: Doubles, which: Indices, held: Indices, added: Indices) -> Indices:
@@ -100,7 +100,7 @@ class BorderedFactor:
         keys += [("added", x) for x in added.tolist()]
         new = [key for key in keys if key not in border.places]
         if len(border.places) + len(new) > border.room:
-            self._border = border = _Border(self._rows.size, border.room)
+            self._border = border = Border(self._rows.size, border.room)
             new = keys
         if new:
             columns = np.zeros((self._rows.size, len(new)))
@@ -115,20 +115,20 @@ class BorderedFactor:
         return np.array([border.places[key] for key in keys], np.intp)
 
 
-class _Border:
+class Border:
     """Columns beside a factor of r unknowns, divided by it, at most `room`.
 
-    places: the column of each sum or unknown. columns: (r, room). products: their inner products,
-    (room, room).
+    places: the column of each sum or unknown, by a key. columns: (r, room), 0 where there is none
+    yet. products: their inner products, (room, room).
     """
 
     def __init__(self, rows: int, room: int) -> None:
-        self.places: dict[tuple[str, int], int] = {}
+        self.places: dict[Hashable, int] = {}
         self.columns = np.zeros((rows, room), order="F")
         self.products = np.zeros((room, room))
         self.room = room
 
-    def join(self, keys: Sequence[tuple[str, int]], columns: Doubles) -> None:
+    def join(self, keys: Sequence[Hashable], columns: Doubles) -> None:
         """Add columns, (r, j)."""
         first = len(self.places)
         end = first + len(keys)

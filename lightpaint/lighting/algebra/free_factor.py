@@ -5,11 +5,10 @@ bounds are nearly the same. A factor of those that were free serves the others b
 held unknown is a constraint on the step, and a released one a further row.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra.bordered_factor import Border
 from lightpaint.lighting.algebra.clipped_newton import RIDGE, SUSPECT_PIVOT, solve_ridged
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual
 from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
@@ -36,7 +35,7 @@ class FreeFactor:
         self._rows = np.zeros(0, np.intp)  # the unknowns of the factor
         self._factor: Doubles | None = None  # None if it is singular, or nearly so
         self._regular = np.zeros(len(M), bool)
-        self._beside = _SolvedColumns.none(0)
+        self._border = Border(0, 0)
 
     def newton_step(self, free: Bools, gradient: Doubles) -> Doubles:
         """Return the step, (n,), to the optimum of the free unknowns; the others do not move.
@@ -73,7 +72,7 @@ class FreeFactor:
         pivots = np.square(factor.diagonal())
         is_regular = not failed and pivots.min() >= SUSPECT_PIVOT
         self._rows, self._factor = rows, factor if is_regular else None
-        self._beside = _SolvedColumns.none(rows.size)
+        self._border = Border(rows.size, int(MAX_KEPT_SHARE * rows.size))
         self._regular[:] = False
         self._regular[rows] = is_regular
         if not failed:
@@ -93,32 +92,34 @@ class FreeFactor:
         half = blas.dtrsv(factor, -gradient[rows], lower=1)
         if held.size or added.size:
             k, unknowns = added.size, np.concatenate([added, rows[held]])
-            columns, which = self._columns_beside(unknowns)
-            small = -columns.products[np.ix_(which, which)]
+            which = self._places(unknowns)
+            columns = self._border.columns[:, : len(self._border.places)]
+            small = -self._border.products[np.ix_(which, which)]
             small[:k, :k] += self._M[np.ix_(added, added)] + RIDGE * rows.size**0.5 * np.eye(k)
             if not _is_regular(small[:k, :k]):
                 return False
-            right = -(columns.solved.T @ half)[which]
+            right = -(columns.T @ half)[which]
             right[:k] -= gradient[added]
-            pushes = np.zeros(len(columns.products))
+            pushes = np.zeros(columns.shape[1])
             pushes[which] = np.linalg.solve(small, right)
-            half -= columns.solved @ pushes
+            half -= columns @ pushes
             move[added] = pushes[which[:k]]
             self._regular[added] = True
         move[rows] = blas.dtrsv(factor, half, lower=1, trans=1)
         move[rows[held]] = 0
         return True
 
-    def _columns_beside(self, unknowns: Indices) -> tuple["_SolvedColumns", Indices]:
-        """Return the solved columns of these unknowns among others, and their places there.
+    def _places(self, unknowns: Indices) -> Indices:
+        """Return the columns of held and added unknowns beside the factor, made where they are new.
 
-        From step to step nearly the same unknowns differ from the unknowns of the factor, so that
-        few columns are new.
+        A held one has a unit vector, an added one the elements of M that join it to the factor's.
+        From step to step nearly the same unknowns differ from these, so that few columns are new.
         """
-        kept = self._beside
+        kept = self._border
         new = [x for x in unknowns.tolist() if x not in kept.places]
-        if len(kept.places) + len(new) > max(MAX_KEPT_SHARE * self._rows.size, unknowns.size):
-            kept, new = _SolvedColumns.none(self._rows.size), unknowns.tolist()
+        if len(kept.places) + len(new) > kept.room:
+            self._border = kept = Border(self._rows.size, max(kept.room, unknowns.size))
+            new = unknowns.tolist()
         if new:
             _, blas = large_libraries()
             place = np.searchsorted(self._rows, new)
@@ -127,36 +128,8 @@ class FreeFactor:
             columns[place[is_held], np.flatnonzero(is_held)] = 1
             added = np.array(new, np.intp)[~is_held]
             columns[:, ~is_held] = self._M[np.ix_(added, self._rows)].T
-            kept = kept.joined(new, blas.dtrsm(1.0, self._factor, columns, lower=1, overwrite_b=1))
-        self._beside = kept
-        return kept, np.array([kept.places[x] for x in unknowns.tolist()], np.intp)
-
-
-@dataclass(frozen=True)
-class _SolvedColumns:
-    """Columns L⁻¹ c beside a Cholesky factor L of r unknowns, and their inner products.
-
-    places: the column of each unknown: a unit vector of one of the factor's, and for others the
-    elements of M that join it to these. solved: (r, m). products: (m, m).
-    """
-
-    places: dict[int, int]
-    solved: Doubles
-    products: Doubles
-
-    @classmethod
-    def none(cls, rows: int) -> "_SolvedColumns":
-        """Return no columns beside a factor of so many unknowns."""
-        return cls({}, np.zeros((rows, 0), order="F"), np.zeros((0, 0)))
-
-    def joined(self, unknowns: list[int], solved: Doubles) -> "_SolvedColumns":
-        """Return these columns and the columns of further unknowns, (r, k)."""
-        across = self.solved.T @ solved
-        products = np.block([[self.products, across], [across.T, solved.T @ solved]])
-        places = {**self.places, **{x: len(self.places) + k for k, x in enumerate(unknowns)}}
-        # In the order of LAPACK, column after column.
-        both = np.concatenate([self.solved.T, solved.T]).T
-        return _SolvedColumns(places, both, products)
+            kept.join(new, blas.dtrsm(1.0, self._factor, columns, lower=1, overwrite_b=1))
+        return np.array([kept.places[x] for x in unknowns.tolist()], np.intp)
 
 
 def projected_newton(

@@ -7,11 +7,8 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from lightpaint.lighting.algebra import optimum as optimum_module
-from lightpaint.lighting.algebra.free_factor import (
-    FreeFactor,
-    _SolvedColumns,
-    projected_newton,
-)
+from lightpaint.lighting.algebra.bordered_factor import Border
+from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.optimum import QuadraticFamily, minimise
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual, scaled
 from lightpaint.threads import one_thread
@@ -45,13 +42,13 @@ def test_steps_from_set_to_set_are_those_of_each_set_alone() -> None:
 def test_columns_beside_a_factor_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sets that wander by one unknown a step, half of which return."""
     (M, b), rng, solved = _problem(1, n=200, pixels=300), np.random.default_rng(2), []
-    joined = _SolvedColumns.joined
+    join = Border.join
 
-    def counted(self: Any, unknowns: Any, columns: Any) -> Any:
+    def counted(self: Any, unknowns: Any, columns: Any) -> None:
         solved.append(len(unknowns))
-        return joined(self, unknowns, columns)
+        join(self, unknowns, columns)
 
-    monkeypatch.setattr(_SolvedColumns, "joined", counted)
+    monkeypatch.setattr(Border, "join", counted)
     factor, free = FreeFactor(M), rng.random(200) < 0.7
     changed: list[int] = []
     for step in range(120):
