@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, largest, read_only
+from lightpaint.arrays import Doubles, Floats, largest, mean_square, read_only
 from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.plane_results import array_name, make_once
 from lightpaint.images import (
@@ -272,7 +272,7 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
     form.
     """
     is_stray = stray_pixels(raw, half_difference, clean)
-    noise, change = _mean_square(half_difference), _mean_square(clean - raw)
+    noise, change = mean_square(half_difference), mean_square(clean - raw)
     variance = box_mean(noise, RADIUS)
     lost_energy = np.maximum(box_mean(np.where(is_stray, 0, change - noise), RADIUS), 0)
     share = _quotient(variance, variance + lost_energy)
@@ -286,17 +286,12 @@ def blend_where_sure(raw: Floats, half_difference: Floats, clean: Floats) -> Flo
     As `blend_by_noise`, with the squared bias of each window less two standard errors of its own.
     The estimate itself, above 0 by chance in half of all windows, would leave specks of grain.
     """
-    noise = _mean_square(half_difference)
-    lost = _mean_square(clean - raw) - noise
+    noise = mean_square(half_difference)
+    lost = mean_square(clean - raw) - noise
     error = np.sqrt(box_mean(np.square(lost), RADIUS)) / (2 * RADIUS + 1)
     variance = box_mean(noise, RADIUS)
     total = variance + np.maximum(box_mean(lost, RADIUS) - SURE_ERRORS * error, 0)
     return _mean_of(raw, clean, _quotient(variance, total)[..., None].astype(np.float32))
-
-
-def _mean_square(values: Floats) -> Doubles:
-    """Return the mean over channels of squares, (h, w)."""
-    return np.asarray(np.square(values, dtype=np.float64).mean(axis=-1), np.float64)
 
 
 def _quotient(part: Floats, total: Floats) -> Floats:

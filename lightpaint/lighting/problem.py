@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, in_any_channel
 from lightpaint.basis import Basis, Lights, Planes, as_multiplied
 from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
@@ -467,7 +467,7 @@ def _color_importance(target: Target) -> Floats:
     """
     if target.at_least is None:
         return target.importance
-    return np.where(target.at_least.any(axis=-1), np.float32(0), target.importance)
+    return np.where(in_any_channel(target.at_least), np.float32(0), target.importance)
 
 
 def _bases(bases: Any) -> list[Basis]:

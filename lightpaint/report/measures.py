@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, in_any_channel
 from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import Estimate, sum_by_bands
@@ -133,8 +133,8 @@ def count_at_least_pixels(solution: Solution, predicted: Floats) -> tuple[int, i
     loss = solution.problem.loss
     counts = (solution.importance > 0)[..., None]
     may_exceed, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))
-    pixels = int(may_exceed.any(axis=-1).sum())
-    return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None
+    pixels = int(in_any_channel(may_exceed).sum())
+    return (pixels, int(in_any_channel(brighter).sum())) if pixels else None
 
 
 def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:

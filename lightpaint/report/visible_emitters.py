@@ -4,7 +4,7 @@ answer.
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, in_all_channels, in_any_channel
 from lightpaint.basis import Basis, joined_texels, texel_lights
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_of
@@ -42,7 +42,7 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
     counted = sees_emitter & painted
     [read] = solution.problem.views.targets
     if read.at_least is not None:
-        counted &= ~read.at_least.all(axis=-1)
+        counted &= ~in_all_channels(read.at_least)
     if not counted.any():
         return []
 
@@ -111,7 +111,7 @@ def _too_bright(
     basis = solution.basis
     # Where the painting means "at least this bright", nothing is too bright.
     if target.at_least is not None:
-        ignored = ignored & ~target.at_least.any(axis=-1)
+        ignored = ignored & ~in_any_channel(target.at_least)
     brightest_light = _brightest_lights(basis, solution.weights, ignored)
     predicted_light, painted_light = (
         np.asarray(luminance(x[ignored])) for x in (predicted.image, target.image)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import images
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, in_all_channels, in_any_channel
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
@@ -177,7 +177,7 @@ class Target(Shown):
             raise SizeError(
                 self.title, f": a wish of another size than its importance, {self.importance.shape}"
             )
-        if lost_count := int((~np.isfinite(self.image).all(axis=-1)).sum()):
+        if lost_count := int((~in_all_channels(np.isfinite(self.image))).sum()):
             raise TargetError(
                 self.title,
                 f" holds NaN or Inf in {lost_count} of "
@@ -243,7 +243,7 @@ class Target(Shown):
             f"  light    {light.min():.3g} to {light.max():.3g}",
         ]
         if self.at_least is not None:
-            brighter = 100 * np.mean(self.at_least.any(axis=-1), where=counts)
+            brighter = 100 * np.mean(in_any_channel(self.at_least), where=counts)
             lines.append(f"  at least {brighter:.3g} % of what counts, or anything brighter")
         if self.transform is not None:
             lines.append(f"  seen     through {self.transform.spoken}")
@@ -394,7 +394,7 @@ def describe_negative(image: Floats, counts: npt.NDArray[np.bool_]) -> str:
 
     image: (h, w, 3) linear. counts: (h, w), the pixels that are looked at.
     """
-    brightness = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
+    brightness = np.where(counts & in_all_channels(np.isfinite(image)), luminance(image), 0)
     darkest = float(brightness.min())
     if darkest >= -NEGATIVE * float(np.abs(brightness).max()):
         return ""

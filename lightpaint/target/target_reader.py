@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, largest
+from lightpaint.arrays import Doubles, Floats, in_all_channels, in_any_channel, largest
 from lightpaint.colour import BUILT_IN, TransformChoice, ViewTransform, luminance
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images import Picture, box_mean, read_mask, read_picture
@@ -326,7 +326,7 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     is_beyond = (light > BEYOND_FACTOR * bright_level) & (
         reading.picture.image > 0.02 * template.transform.white
     )
-    share = float((is_beyond.any(axis=-1) & painted).sum() / painted.sum())
+    share = float((in_any_channel(is_beyond) & painted).sum() / painted.sum())
     if share <= FEW_SHARE:
         return []
     remark = Sentence(
@@ -376,7 +376,7 @@ def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
     """Return the approximate exposure at which that view shows most of `look` as in `display`."""
     light, look_brightness = luminance(view.decode(display)), luminance(look)
     low, high = TELLING_RANGE
-    is_unclipped = (display > low).all(axis=-1) & (display < high).all(axis=-1)
+    is_unclipped = in_all_channels((display > low) & (display < high))
     is_unclipped &= (light > 0) & (look_brightness > 0)
     if not is_unclipped.any():
         return 0.0

@@ -26,7 +26,7 @@ from threading import Lock
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, in_any_channel
 from lightpaint.colour import LUMINANCE, decode_display, encode_display
 from lightpaint.images import block_sums, dilated, enlarged, gaussian_mean, number_parts
 from lightpaint.progress import cancellation_check
@@ -473,7 +473,7 @@ def extend_marked(
     dark = DARK * float(np.mean(current_look))
     if not at_least.any() or not dark > 0:
         return image
-    extended, painted, is_plain = image.copy(), importance > 0, ~at_least.any(axis=-1)
+    extended, painted, is_plain = image.copy(), importance > 0, ~in_any_channel(at_least)
     areas = (wish.area > COVERED for wish in layers) if layers else (painted,)
     check = cancellation_check()
     for area in areas:

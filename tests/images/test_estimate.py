@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter
 
+from lightpaint.arrays import in_all_channels, in_any_channel, mean_square
 from lightpaint.errors import ImageError, SizeError
 from lightpaint.images.estimate import Estimate, box_mean, read_estimate, write_estimate
 from lightpaint.images.formats.exr import write_rgb
@@ -80,6 +81,14 @@ def test_a_window_beyond_the_picture_is_the_whole_picture():
         np.testing.assert_allclose(found, np.broadcast_to(mean, (3, 4, 3)), rtol=1e-12)
     with pytest.raises(SizeError, match="radius is -1: expected a whole number of pixels >= 0"):
         estimate.variance(radius=-1)
+
+
+@given(st.integers(0, 2**16), st.sampled_from([np.float16, np.float32, np.float64]))
+def test_channels_are_reduced_as_numpy_reduces_them(seed: int, kind: type):
+    image = np.random.default_rng(seed).normal(size=(5, 7, 3)).astype(kind)
+    assert (mean_square(image) == np.square(image, dtype=np.float64).mean(axis=-1)).all()
+    assert (in_any_channel(image > 0) == (image > 0).any(axis=-1)).all()
+    assert (in_all_channels(image > 0) == (image > 0).all(axis=-1)).all()
 
 
 def test_box_mean_of_an_impulse():

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, as_rgb
+from lightpaint.arrays import Bools, Doubles, Floats, as_rgb, in_any_channel
 from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images import bands_of
@@ -96,7 +96,7 @@ class ErrorEnergies:
 def _uncounted(importance: Doubles, image: Floats) -> Doubles:
     """Return the share of pixels, (h, w), that does not count, in which `image` has a colour."""
     # Black target pixels have no colour to miss.
-    return np.where(np.any(image > 0, axis=-1), np.maximum(1 - importance, 0), 0)
+    return np.where(in_any_channel(image > 0), np.maximum(1 - importance, 0), 0)
 
 
 def grain_power(solution: Solution, unreachable: Floats) -> float:

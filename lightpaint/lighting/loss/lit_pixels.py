@@ -14,7 +14,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, in_all_channels
 from lightpaint.basis import (
     Basis,
     Planes,
@@ -370,7 +370,7 @@ def bin_pixels(views: Views, loss: pixel_loss.Loss, side: int) -> BinnedPixels |
         view_loss = loss.cut(cut)
         counts = view_loss.importance.astype(np.float64)
         # Emitters that may be brighter count in a block that has nothing else.
-        glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
+        glows = basis.emitters_seen & in_all_channels(view_loss.exceeds(np.inf))
         weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
         # Each step of the solve needs the images again, but only some sums need their noise.

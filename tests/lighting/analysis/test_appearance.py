@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from texel_grid import texel_names
 
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
@@ -184,6 +185,32 @@ def test_an_undetermined_light_that_hardly_reaches_the_place_is_not_the_reason(
         untold=np.array([True, True]),
     )
     assert with_undetermined(appearance, solution, uncertain).hidden_lights == hidden
+
+
+def test_only_planes_of_undetermined_lights_are_asked_for_their_paths(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    noise = np.random.default_rng(3).normal(0, 0.01, (5, *SIZE, 3))
+    basis = make_basis(n=5, size=SIZE, half_differences=noise)
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), 0.5)
+    solution = solve(basis, target, constraints=Constraints.of({"*": {"lock": True}}))
+    appearance, bars = compare_appearance(solution), error_bars(solution)
+    assert appearance.place is not None
+    assert bars is not None
+    asked: list[int] = []
+    whole = MemoryPlanes.plane
+
+    def plane(planes: MemoryPlanes, k: int) -> Any:
+        asked.append(k)
+        return whole(planes, k)
+
+    def pixels(*_: Any) -> Any:
+        pytest.fail("pixels of all planes were read")
+
+    monkeypatch.setattr(MemoryPlanes, "plane", plane)
+    monkeypatch.setattr(MemoryPlanes, "pixels", pixels)
+    with_undetermined(appearance, solution, replace(bars, untold=np.arange(5) == 3))
+    assert asked == [3, 3]  # its light, and its noise
 
 
 def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):

@@ -379,23 +379,28 @@ def _light_of_errors(
     errors = np.nan_to_num(high - solution.weights if is_dark else solution.weights - low)
     reaching = _local_light(solution, place, weight)
     if uncertainty.untold.any():
-        unseen = UNSEEN_PATHS * _light_of_paths(solution) / np.count_nonzero(weight)
-        reaching[uncertainty.untold] += unseen[uncertainty.untold]
+        untold = np.flatnonzero(uncertainty.untold)
+        unseen = UNSEEN_PATHS * _light_of_paths(solution, untold) / np.count_nonzero(weight)
+        reaching[untold] += unseen
     return missing, errors * reaching
 
 
-def _light_of_paths(solution: Solution) -> Doubles:
-    """Return the light that one path of each light brings to a pixel, (n, 3), by a sample of the
-    painted pixels.
+def _light_of_paths(solution: Solution, lights: Indices) -> Doubles:
+    """Return the light that one path of each of some lights, (k,), brings to a pixel, (k, 3), by a
+    sample of the painted pixels.
 
     If paths find a light by chance, its variance is its mean times the light of a path. Of a light
     without noise it is 0.
     """
     basis, painted = solution.basis, np.flatnonzero(solution.importance)
     step = -(-len(painted) * len(basis.names) // PATH_SAMPLE)
-    light, noise = (x.pixels(painted[::step]) for x in (basis.planes, basis.noise))
-    total = light.sum(axis=1, dtype=np.float64)
-    variance = np.square(noise, dtype=np.float64).sum(axis=1)
+    total, variance = np.empty((2, len(lights), 3))
+    for row, k in enumerate(lights):
+        light, noise = (
+            x.plane(int(k)).reshape(-1, 3)[painted[::step]].astype(np.float64)
+            for x in (basis.planes, basis.noise)
+        )
+        total[row], variance[row] = np.einsum("pc->c", light), np.einsum("pc,pc->c", noise, noise)
     return np.asarray(np.divide(variance, total, out=np.zeros_like(total), where=total > 0))
 
 

@@ -23,7 +23,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, mean_square
 from lightpaint.basis import Basis, Planes, as_planes, walked_blocks
 from lightpaint.errors import BasisError, LightpaintError, SizeError
 from lightpaint.images import Estimate, SurfaceFilter, box_mean
@@ -226,12 +226,12 @@ def _share(noise: Planes, of_planes: Floats, of_noise: Floats) -> Floats:
     """
     variance, remainder, change = np.zeros((3, *noise.size))
     for half, of_plane, of_half in zip(noise, of_planes, of_noise, strict=True):
-        squares = np.square(half, dtype=np.float64).mean(axis=-1)
+        squares = mean_square(half)
         # Each light counts alike, by its noise.
         unit = 1 / max(float(squares.mean()), np.finfo(np.float64).tiny)
         variance += unit * squares
-        remainder += unit * np.square(of_half, dtype=np.float64).mean(axis=-1)
-        change += unit * np.square(of_plane, dtype=np.float64).mean(axis=-1)
+        remainder += unit * mean_square(of_half)
+        change += unit * mean_square(of_plane)
     V, B = (box_mean(x, WINDOW_RADIUS) for x in (variance, change - remainder))
     total = V + np.maximum(B, 0)
     share = np.divide(V, total, out=np.zeros_like(total), where=total > 0)
