@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 import lightpaint as lp
 from lightpaint.colour.color import LUMINANCE, cct_and_duv, kelvin_to_rgb
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
 from lightpaint.lighting.linear_problem import PaintReading
-from lightpaint.lighting.loss import weight_penalty
+from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
@@ -187,6 +187,16 @@ def test_alike_are_lights_of_one_shape(make_basis: Any):
     basis, target = _bar(make_basis)
     assert Wash.of(basis, target).alike.tolist() == [[0, 1], [1, 0]]
     assert not Wash.of(_basis(make_basis), _paint(_basis(make_basis))).alike.size
+
+
+def test_mixes_of_own_colours_are_the_nearest():
+    """As SciPy's active sets find them, up to the slow end of an iteration."""
+    rng = np.random.default_rng(0)
+    colors, asked = rng.random((300, 4, 3)) ** 2, rng.random((300, 3))
+    colors[::3, 2:] = 0  # smaller groups
+    found = expected_lights._nearest_mixes(colors, asked)
+    best = [nnls(c.T, t)[0] @ c for c, t in zip(colors, asked, strict=True)]
+    np.testing.assert_allclose(found, best, atol=0.01)
 
 
 def test_of_lamps_beside_each_other_those_change_that_bring_what_is_missing(make_basis: Any):

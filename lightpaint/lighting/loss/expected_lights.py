@@ -64,6 +64,9 @@ ADJUSTED_BLOCKS = 2**10
 #: and more, no others of the scenes in scenes/ more than .73.
 ALIKE, ALIKE_BLOCKS = 0.9, 2**11
 
+#: Steps of the iteration that mixes the colours of lamps that are alike.
+MIX_STEPS = 200
+
 #: Cosine between the light of a lamp and the light that is missing, from 0 down, from which the
 #: lamp does not bring what is missing at all.
 AGAINST = -0.25
@@ -500,12 +503,9 @@ class ExpectedLights:
         change = moved / np.where(sums > 0, sums, 1)
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         pairs = wash.alike if is_free is None else wash.alike[is_free[wash.alike].all(axis=1)]
-        brings: float | Doubles = 1.0
-        if len(pairs):
-            light = wash.light_sums(wash.counts[None])[..., 0].T * current
-            needed, brings = _needed_colors(light, change, pairs)
-            amount *= needed
-        excess = (amount / MEANT_STOPS) ** SHARPNESS
+        light = wash.light_sums(wash.counts[None])[..., 0].T if len(pairs) else sums
+        needed, brings = _needed_colors(light * current, change, pairs)
+        excess = (amount * needed / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(brings * excess / (1 + excess), np.float64)
         emission, painted = (
             np.asarray(current * 2.0 ** np.clip(x, -MOST_STOPS, MOST_STOPS))
@@ -531,20 +531,42 @@ def _needed_colors(light: Doubles, change: Doubles, pairs: Indices) -> tuple[Dou
     light: (n, 3), in the picture, of the current emission. change: (n, 3), in stops. pairs: (m, 2),
     see `alike_lights`.
     """
-    from scipy.optimize import nnls
-
     needed, brings = np.ones((2, len(light)))
-    spread = np.ptp(change, axis=1)
-    for k in np.unique(pairs[:, 0]):
-        colors = light[[k, *pairs[pairs[:, 0] == k, 1]]]
-        asked = colors.sum(axis=0) * 2.0 ** np.clip(change[k], -MOST_STOPS, MOST_STOPS)
-        if not (asked > 0).all() or not spread[k] > 0:
-            continue
-        mix = nnls(colors.T, asked)[0] @ colors
-        left = np.ptp(np.log2(np.maximum(mix / asked, np.finfo(np.float32).tiny)))
-        needed[k] = min(left / spread[k], 1)
-        own, missing = colors[0], asked - mix
-        lengths = float(np.linalg.norm(own) * np.linalg.norm(missing))
-        if lengths > 0:
-            brings[k] = np.clip(1 - own @ missing / lengths / AGAINST, 0, 1)
+    if not len(pairs):
+        return needed, brings
+    lights, first, count = np.unique(pairs[:, 0], return_index=True, return_counts=True)
+    # The members of each group, of which the first is the light itself; the last row is dark.
+    members = np.full((len(lights), count.max() + 1), len(light))
+    members[:, 0] = lights
+    for k, (start, many) in enumerate(zip(first, count, strict=True)):
+        members[k, 1 : 1 + many] = pairs[start : start + many, 1]
+    colors = np.concatenate([light, np.zeros((1, 3))])[members]
+    asked = colors.sum(axis=1) * 2.0 ** np.clip(change[lights], -MOST_STOPS, MOST_STOPS)
+    mix = _nearest_mixes(colors, asked)
+    least = np.finfo(np.float32).tiny
+    left, spread = (
+        np.ptp(x, axis=1) for x in (np.log2((mix + least) / (asked + least)), change[lights])
+    )
+    needed[lights] = np.minimum(left / np.where(spread > 0, spread, np.inf), 1)
+    own, missing = colors[:, 0], asked - mix
+    lengths = np.linalg.norm(own, axis=1) * np.linalg.norm(missing, axis=1)
+    cosine = np.vecdot(own, missing) / np.where(lengths > 0, lengths, np.inf)
+    brings[lights] = np.clip(1 - cosine / AGAINST, 0, 1)
     return needed, brings
+
+
+def _nearest_mixes(colors: Doubles, asked: Doubles) -> Doubles:
+    """Return the mixes Σⱼ gⱼ cⱼ of k groups with min ‖T − Σⱼ gⱼ cⱼ‖ and g >= 0, (k, 3).
+
+    By the iteration that clips at zero inside every step (Schoeneman et al. 1993, Eq 6). colors:
+    (k, m, 3). asked: (k, 3).
+    """
+    shares, left = np.zeros(colors.shape[:2]), asked.copy()
+    squares = np.vecdot(colors, colors)
+    squares[squares == 0] = np.inf
+    for _ in range(MIX_STEPS):
+        for j in range(colors.shape[1]):
+            step = np.maximum(np.vecdot(colors[:, j], left) / squares[:, j], -shares[:, j])
+            shares[:, j] += step
+            left -= step[:, None] * colors[:, j]
+    return asked - left
