@@ -190,13 +190,14 @@ def test_alike_are_lights_of_one_shape(make_basis: Any):
 
 
 def test_mixes_of_own_colours_are_the_nearest():
-    """As SciPy's active sets find them, up to the slow end of an iteration."""
+    """As SciPy finds them; the iteration is slow where two of the colours are nearly one."""
     rng = np.random.default_rng(0)
     colors, asked = rng.random((300, 4, 3)) ** 2, rng.random((300, 3))
     colors[::3, 2:] = 0  # smaller groups
     found = expected_lights._nearest_mixes(colors, asked)
     best = [nnls(c.T, t)[0] @ c for c, t in zip(colors, asked, strict=True)]
-    np.testing.assert_allclose(found, best, atol=0.01)
+    np.testing.assert_allclose(found, best, atol=0.02)
+    assert np.median(np.abs(found - best)) < 1e-6
 
 
 def test_of_lamps_beside_each_other_those_change_that_bring_what_is_missing(make_basis: Any):
