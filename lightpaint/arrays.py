@@ -33,6 +33,9 @@ Position = tuple[float, float, float]
 #: Numbers that the processor's cache has room for, with copies of them.
 _CACHED_NUMBERS = 2**14
 
+#: Bytes from which on a process gives memory back between the stages of a solve.
+LARGE_MEMORY = 2**30
+
 #: Bytes that the registers of any processor hold at most: arrays that Dr.Jit makes begin so.
 ALIGNMENT = 64
 
@@ -93,11 +96,19 @@ def release_freed_memory() -> None:
     """Return the memory of arrays that are gone to the system, where its C library keeps it.
 
     Between small objects that stay, glibc keeps the memory of arrays up to 32 MB: after a file with
-    a thousand lights four times as much as the lights take.
+    a thousand lights four times as much as the lights take. A process that has never held
+    `LARGE_MEMORY` keeps it: the system would clear the same pages again for the next arrays.
     """
-    if sys.platform == "linux":
+    if sys.platform == "linux" and _peak_memory() >= LARGE_MEMORY:
         with suppress(OSError, AttributeError):  # another C library
             ctypes.CDLL(None).malloc_trim(0)
+
+
+def _peak_memory() -> int:
+    """Return the most memory that this process has held at a time, in bytes, on Linux."""
+    import resource  # which Windows has not
+
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def as_rgb(values: Iterable[Any]) -> RGB:

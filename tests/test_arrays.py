@@ -1,10 +1,13 @@
 """Arrays that are copied to where other libraries read them best."""
 
+import sys
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from lightpaint import arrays
 from lightpaint.arrays import ALIGNMENT, aligned, is_finite
 
 
@@ -26,3 +29,16 @@ def test_is_finite_is_what_numpy_says(kind: Any, value: float) -> None:
     values[1, 2] = value
     assert is_finite(values) == np.isfinite(values).all()
     assert is_finite(values[:, ::2]) == np.isfinite(values[:, ::2]).all()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the largest memory")
+def test_only_a_process_that_was_large_gives_memory_back(monkeypatch: pytest.MonkeyPatch):
+    given_back: list[int] = []
+    monkeypatch.setattr(
+        arrays.ctypes, "CDLL", lambda _: SimpleNamespace(malloc_trim=given_back.append)
+    )
+    held = np.ones(2**20)
+    for limit, count in ((2**62, 0), (held.nbytes, 1)):
+        monkeypatch.setattr(arrays, "LARGE_MEMORY", limit)
+        arrays.release_freed_memory()
+        assert len(given_back) == count
