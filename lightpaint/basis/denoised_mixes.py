@@ -128,7 +128,7 @@ def read_look(basis: Basis) -> Floats:
 
     def make() -> Floats:
         weights, look = basis.current_weights, basis.current_look
-        clean = denoise_mix(basis, weights, factor=READ_SIDE)
+        clean = denoise_mix(basis, weights, mixed=look, factor=READ_SIDE)
         change = enlarged(clean - block_mean(look, READ_SIDE), READ_SIDE)
         return read_only(look + edge_padded(change, basis.size))
 

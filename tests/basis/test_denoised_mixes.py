@@ -346,6 +346,15 @@ def test_the_look_that_is_read_has_little_noise_in_blocks_and_keeps_single_pixel
     assert 0.5 < stated / error < 1.5
 
 
+def test_reading_the_look_walks_no_image_again(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    basis = replace(split_basis(*pools_and_glow(), rng), features=wall())
+    known = basis.current_look
+    monkeypatch.delattr(Basis, "mixes")
+    assert read_look(basis).shape == known.shape
+
+
 @pytest.mark.parametrize("size", [(47, 64), (48, 63), (25, 45)])
 def test_the_look_of_a_picture_with_odd_sides_is_read(
     size: tuple[int, int], rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch

@@ -47,7 +47,7 @@ CLEAN, CLEAN_RADIUS = 1e-5, 2
 DECODED_MAX_BYTES = 2**26
 
 #: Number of pixels of a light that are decoded and mixed at a time, in a processor's cache.
-MIXED_PIXELS = 2**15
+MIXED_PIXELS = 2**16
 
 #: Number of pixels that are encoded at a time.
 STRIP_PIXELS = 2**14
