@@ -4,6 +4,7 @@
     python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
     python benchmarks/painter.py --start scenes/gallery/scene.xml [--times N]
     python benchmarks/painter.py --layers 20 [--cases 12x960x540] [--strokes N]
+    python benchmarks/painter.py --long BASIS --layers 75 --strokes 200
     python benchmarks/painter.py --answers
     python benchmarks/painter.py --many 64 256 1000
     python benchmarks/painter.py --moves scenes/gallery/scene.xml
@@ -26,6 +27,9 @@ pointer until its picture is drawn: its plane along frozen paths, the lights sol
 
 With --layers, the same for the brush on the topmost of N layers, in turns with that on one, and
 what layers cost at the start of a session; with --session, its part of a stroke alone.
+
+With --long, Python's part of strokes over more and more layers of a saved basis, ten by ten, and
+its memory.
 
 With --many, Python's part of a stroke with so many lights at 320x180, in seconds of the clock and
 of the processor.
@@ -126,6 +130,7 @@ def main() -> None:
     parser.add_argument("--exact", action="store_true", help="with --start: wait for the answer")
     parser.add_argument("--layers", type=int, metavar="N")
     parser.add_argument("--session", action="store_true", help="with --layers: without pages")
+    parser.add_argument("--long", metavar="BASIS", help="with --layers and --strokes")
     parser.add_argument("--answers", action="store_true")
     parser.add_argument("--many", nargs="+", type=int, metavar="N")
     parser.add_argument("--moves", metavar="SCENE")
@@ -135,6 +140,11 @@ def main() -> None:
         return
     if options.moves:
         print_moves(options.moves)
+        return
+    if options.long:
+        import painter_layers
+
+        painter_layers.print_long_session(options.long, options.layers or 75, options.strokes)
         return
     if options.many:
         print_many(options.many)

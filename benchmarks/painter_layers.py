@@ -22,7 +22,7 @@ import lightpaint as lp
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.painting_session import Session
-from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.history_steps import Identity, Region, slices
 from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 
@@ -117,6 +117,64 @@ def print_session(basis: lp.Basis, count: int, strokes: int) -> None:
             f"   99 % {worst:6.1f} ({worst / base[1]:.2f}x)",
             flush=True,
         )
+
+
+def print_long_session(path: str, layers: int, strokes: int, pieces: int = 20) -> None:
+    """Print what strokes over more and more layers cost the session, ten by ten, and its memory.
+
+    path: of a saved basis. The first strokes make a layer each, of which every fifth adjusts what
+    it covers; later ones are on any of them. Nothing else runs: no page, and no exact answers.
+    """
+    from painter import largest_gb, trim
+
+    basis = lp.read_basis(path)
+    look, (height, width), rng = basis.current_look, basis.size, np.random.default_rng(0)
+    print(f"{len(basis.lights)} lights at {width}x{height}, {layers} layers, ms of the processor")
+    heads = "strokes", "median", "95 %", "last piece", "MB", "largest MB"
+    print("{:>8s} {:>8s} {:>8s} {:>11s} {:>8s} {:>11s}".format(*heads))
+    with tempfile.TemporaryDirectory() as folder:
+        store = Store.open(Path(folder) / "session.db", Identity.of([basis]))
+        session = Session([basis], [look], store, settings=Settings(), transform=lp.ViewTransform())
+        times: list[list[float]] = []
+        for stroke in range(1, strokes + 1):
+            number = stroke if stroke <= layers else int(rng.integers(1, layers + 1))
+            y = int((0.1 + 0.8 * rng.random()) * height)
+            times.append([])
+            for k in range(pieces):
+                x = int((0.1 + 0.75 * k / pieces) * width)
+                region = (max(0, y - 20), min(height, y + 20), x, min(width, x + 40))
+                request = _piece(session, stroke, number, region, is_final=k == pieces - 1)
+                light = (1.2 * look[slices(region)]).astype(np.float32)
+                arrays = {"image": light, "importance": np.full(light.shape[:2], 0.7, np.float32)}
+                start = time.process_time()
+                session.handle(request, arrays)
+                times[-1].append(1e3 * (time.process_time() - start))
+            if stroke % 10 == 0:
+                trim()
+                moving = [x for each in times for x in each[:-1]]
+                middle, worst = np.percentile(moving, [50, 95])
+                last = np.median([each[-1] for each in times])
+                largest = 1e3 * largest_gb(os.getpid())
+                print(
+                    f"{stroke:8d} {middle:8.1f} {worst:8.1f} {last:11.1f}"
+                    f" {_memory_mb():8.0f} {largest:11.0f}",
+                    flush=True,
+                )
+                times = []
+        store.close()
+
+
+def _piece(
+    session: Session, stroke: int, number: int, region: Region, *, is_final: bool
+) -> protocol.Paint:
+    """Return the request of a piece of a stroke on a layer, which the first one makes."""
+    if number in session.views.layers.ids:
+        layer = session.views.layers[number]
+    elif number % 5 == 0:
+        layer = Layer(number, "adjust", f"Adjusted {number}", gain=1.03, tint=(1.01, 1.0, 0.99))
+    else:
+        layer = Layer(number, "paint", f"1 stroke {number}")
+    return protocol.Paint(stroke, region, is_final, layer=number, properties=layer)
 
 
 def print_pages(opened: Any, count: int, strokes: int) -> None:

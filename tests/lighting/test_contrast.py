@@ -639,3 +639,22 @@ def _difference(problem: Any, weights: np.ndarray) -> float:
     """The mean ΔE of an answer from the paint."""
     look = PaintComparison.of_problem(problem)
     return look.mean(look.difference(look.pixels(problem.basis.mix(weights))))
+
+
+def test_the_term_of_contrasts_is_the_symmetric_sum_over_its_rows():
+    rng = np.random.default_rng(2)
+    contrast, rest = rng.normal(size=(2, 7, 3, 5))
+    shares = rng.random((4, 7))
+    goal = rng.random((7, 3))
+    rows = ContrastRows(contrast, rest, goal, shares[0], shares[1], shares[2])
+    term = rows.term(3.0)
+    assert term is not None
+    constant, exact = weight_penalty.CONTRAST, shares[0] * shares[1]
+    lift = 3 * shares[2] * (constant + exact * (weight_penalty.EXACT_CONTRAST - constant))
+    keep = 3 * shares[2] * weight_penalty.EXACT_REST * shares[0]
+    expected = sum(
+        x * c[:, :, None] * c[:, None] + y * r[:, :, None] * r[:, None]
+        for x, y, c, r in zip(lift, keep, contrast, rest, strict=True)
+    )
+    np.testing.assert_allclose(term.M, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(term.M, term.M.transpose(0, 2, 1))

@@ -1,15 +1,20 @@
 """The sums behind answers under a brush, against those over the whole picture."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.basis.planes import MemoryPlanes
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.live import live_sums
 from lightpaint.lighting.live.live_sums import PaintedTiles, SmallFilm
 from lightpaint.lighting.loss import expected_lights
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.target import Wish
 
 SIZE = 40, 70
 
@@ -82,3 +87,56 @@ def test_the_film_reads_the_paint_as_exact_answers_do(
         one, other = (np.asarray(getattr(x, name))[..., counts] for x in (live, exact))
         np.testing.assert_allclose(one, other, rtol=1e-6, err_msg=name)
     np.testing.assert_array_equal(live.importance, exact.importance)
+
+
+def test_wishes_that_stay_as_they_are_are_summed_and_divided_once(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    """What is kept of the last reading equals what a new film reads, also for replaced planes."""
+    basis = make_basis(5, SIZE)
+    image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
+    areas = [np.zeros(SIZE, np.float32) for _ in range(6)]
+    for k, area in enumerate(areas):
+        area[6 * k : 6 * k + 4, 10 + 2 * k : 40] = 1
+        image[area > 0] *= 1 + 0.1 * k
+        importance[area > 0] = 1
+    film = SmallFilm(basis, image, importance, 2**12)
+    summed: list[int] = []
+    light_sums, wish_places = Wash._light_sums, live_sums.wish_places
+    monkeypatch.setattr(
+        Wash, "_light_sums", lambda wash, x: summed.append(len(x)) or light_sums(wash, x)
+    )
+    monkeypatch.setattr(
+        live_sums, "wish_places", lambda x, size: summed.append(len(x)) or wish_places(x, size)
+    )
+
+    def read(film: SmallFilm) -> tuple[Wash, Any]:
+        wishes = [Wish(f"wish {k}", area) for k, area in enumerate(areas)]
+        wash = film.wash(lambda _side: wishes, is_sketch=True)
+        return wash, wash.light_sums(wash.wishes * wash.counts)
+
+    def check() -> None:
+        wash, sums = read(film)
+        expected, expected_sums = read(SmallFilm(film_basis, image, importance, 2**12))
+        np.testing.assert_array_equal(wash.places, expected.places)
+        np.testing.assert_allclose(sums, expected_sums, rtol=1e-13)  # of a product of other shape
+
+    film_basis = basis
+    read(film)
+    areas[2][30:34, 50:60] = 1  # a second place of the third wish
+    areas.append(np.zeros(SIZE, np.float32))
+    areas[-1][36:, 60:] = 1
+    summed.clear()
+    read(film)
+    assert summed == [2, 2]
+    check()
+    areas.pop(0)
+    summed.clear()
+    read(film)
+    assert not summed  # the others have other numbers now, and are the same
+    check()
+    planes = MemoryPlanes(basis.images.copy()).replaced({1: 2 * basis.images[1]})
+    former = Estimate(basis.current_look, basis.current_noise)
+    film_basis = replace(basis, planes=planes, former=former)
+    film.replace_planes(film_basis, [1])
+    check()

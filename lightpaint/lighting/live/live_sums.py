@@ -14,6 +14,7 @@ from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import (
     ON_EMITTERS,
     FlameWishes,
+    KeptResults,
     Wash,
     alike_lights,
     are_outlined,
@@ -143,6 +144,8 @@ class SmallFilm:
         self.rows: Floats = array_once(basis.planes, name, lambda: self._averages(basis.planes))
         self._owns_rows, self._primaries = False, basis.origin.primaries
         self._draft: tuple[Floats, Floats, int] | None = None
+        # Of the wishes as they were read last.
+        self._kept_sums, self._kept_places = KeptResults(), KeptResults()
         #: (3, p), of the visible surfaces; 1 where it is not known.
         self.albedo: Floats = np.ones(self.rows.shape[::2], np.float32)
         if basis.features is not None:
@@ -191,7 +194,7 @@ class SmallFilm:
 
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
         """Average the replaced planes of some lights, by number."""
-        self._planes, self._draft = basis.planes, None
+        self._planes, self._draft, self._kept_sums = basis.planes, None, KeptResults()
         if not self._owns_rows:
             self.rows, self._owns_rows = self.rows.copy(), True
         for k in lights:
@@ -338,7 +341,7 @@ class SmallFilm:
         shares = wish_shares(wishes, painted, small_importance, self._read_look)
         exact = joint_cover([x for x in wishes if x.is_exact], self._size)
         strokes = joint_cover([x for x in wishes if x.has_strokes], self._size)
-        places = wish_places(shares, self._size)
+        places = self._kept_places.of(shares, lambda x: wish_places(x, self._size))
         return Wash(
             self.rows,
             painted.reshape(-1, 3).T,
@@ -352,6 +355,7 @@ class SmallFilm:
             flames,
             are_outlined(wishes),
             self._alike,
+            self._kept_sums,
         )
 
     @cached_property

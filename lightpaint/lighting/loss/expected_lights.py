@@ -6,12 +6,13 @@ expected to keep its own. How much colour is asked for where a light shines says
 to its colour may be, and how much light, how dim it will be.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, sqrt
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import (
@@ -119,6 +120,32 @@ class FlameWishes:
         return cls(*(np.concatenate([getattr(x, k) for x in views]) for k in ("rows", "light")))
 
 
+class KeptResults:
+    """Results for each row of a matrix, computed only for rows that the last matrix had not.
+
+    From one reading of a painting to the next most wishes stay as they are, if not their numbers.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[Doubles, dict[float, int], npt.NDArray[Any]] | None = None
+
+    def of(self, rows: Doubles, compute: Callable[[Doubles], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """Return the results for rows (k, p), (k, ...). compute: returns them for some rows."""
+        # Moments tell which rows to compare; equal values decide.
+        moments = np.einsum("kp,p->k", rows, np.arange(1, rows.shape[1] + 1)).tolist()
+        before, numbers, known = self._last or (rows, {}, rows)
+        places = [numbers.get(x, -1) for x in moments]
+        is_new = np.array(
+            [n < 0 or not np.array_equal(x, before[n]) for n, x in zip(places, rows, strict=True)],
+            bool,
+        )
+        results = known[places] if not is_new.all() else compute(rows)
+        if is_new.any() and not is_new.all():
+            results[is_new] = compute(rows[is_new])
+        self._last = rows, {x: k for k, x in enumerate(moments)}, results
+        return results
+
+
 @dataclass(frozen=True)
 class Wash:
     """A painting, the look under it and the light of each lamp, averaged over blocks of pixels.
@@ -129,7 +156,8 @@ class Wash:
     numbers; strokes: (p,), the cover of layers of strokes. places: (k, p), the number of the
     separate place of each wish to which a block belongs, and 0 for none. flames: the wishes for
     emitters in view. is_outlined: whether layers say where wishes end, and none was found in
-    strokes. alike: (m, 2), see `alike_lights`.
+    strokes. alike: (m, 2), see `alike_lights`. kept_sums: sums of `rows`, which readings of a
+    painting that changes may share.
     """
 
     rows: Floats
@@ -144,6 +172,7 @@ class Wash:
     flames: FlameWishes
     is_outlined: bool = False
     alike: Indices = field(default_factory=lambda: np.zeros((0, 2), np.intp))
+    kept_sums: KeptResults = field(default_factory=KeptResults, repr=False)
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -156,7 +185,9 @@ class Wash:
         if len(views) == 1:
             return views[0]
         names = "rows", "painted", "look", "importance", "counts", "exact", "strokes"
-        joined = {k: np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names}
+        joined: dict[str, Any] = {
+            k: np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names
+        }
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
         places = np.zeros(wishes.shape, np.intp)
@@ -207,7 +238,15 @@ class Wash:
 
         weights: (k, p), or (3, k, p) with others for each channel.
         """
-        columns = np.swapaxes(np.asarray(weights, np.float64), -1, -2)
+        weights = np.asarray(weights, np.float64)
+        if weights.ndim == 3:
+            return self._light_sums(weights)
+        sums = self.kept_sums.of(weights, lambda x: self._light_sums(x).transpose(2, 0, 1))
+        return np.asarray(sums.transpose(1, 2, 0))
+
+    def _light_sums(self, weights: Doubles) -> Doubles:
+        """Return the same as `light_sums`, without results that are kept."""
+        columns = np.swapaxes(weights, -1, -2)
         # In double precision, so that the order of views and threads does not show.
         with one_thread():
             parts = [

@@ -206,10 +206,16 @@ class ContrastRows:
         exact = self.exact * self.by_numbers
         lift = each * (CONTRAST + exact * (EXACT_CONTRAST - CONTRAST))
         keep = each * EXACT_REST * self.exact
-        M = np.einsum("k,kci,kcj->cij", lift, self.contrast, self.contrast)
-        M += np.einsum("k,kci,kcj->cij", keep, self.rest, self.rest)
+        M = _weighted_squares(lift, self.contrast) + _weighted_squares(keep, self.rest)
         b = np.einsum("k,kci,kc->ci", keep, self.rest, self.rest_goal)
         return NormalEquations(M, b, keep @ self.rest_goal**2)
+
+
+def _weighted_squares(weights: Doubles, rows: Doubles) -> Doubles:
+    """Return Σₖ wₖ rₖ rₖᵀ of each channel, (3, n, n). weights: (k,), from 0; rows: (k, 3, n)."""
+    scaled = (np.sqrt(np.maximum(weights, 0))[:, None, None] * rows).transpose(1, 0, 2)
+    with one_thread():
+        return np.asarray(scaled.transpose(0, 2, 1) @ scaled)
 
 
 def flame_term(
