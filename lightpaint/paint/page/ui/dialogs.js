@@ -16,37 +16,19 @@ import { t } from '../language/language.js';
 /** @param {{ui: Ui, app: App}} props */
 export function Dialogs({ ui, app }) {
   const close = () => app.store.set({ dialog: null });
-  if (ui.dialog === 'keys') return html`<${ShortcutsDialog} ui=${ui} app=${app} close=${close} />`;
-  if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
-  if (ui.dialog === 'render')
-    return html`<${FinalRenderDialog} ui=${ui} app=${app} close=${close} />`;
-  if (ui.dialog === 'move') return html`<${MoveDialog} app=${app} close=${close} />`;
-  if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
-  if (ui.dialog === 'presets') return html`<${PresetsDialog} ui=${ui} app=${app} close=${close} />`;
-  return null;
+  const Shown = ui.dialog && DIALOGS[ui.dialog];
+  return Shown && html`<${Shown} ui=${ui} app=${app} close=${close} />`;
 }
 
-/** @type {{key: import("../engine/messages.js").Export["outputs"][number], label: string,
- *   description: string}[]} */
+/** @type {[key: import("../engine/messages.js").Export["outputs"][number], label: string,
+ *   description: string][]} */
 const EXPORTS = [
-  { key: 'target', label: t('Painting'), description: t('painting.exr, for lightpaint solve') },
-  {
-    key: 'layers',
-    label: t('Layers'),
-    description: t('layers.exr and layers.ora, for Krita and others'),
-  },
-  { key: 'picture', label: t('Picture'), description: t('answer.png: the answer as a picture') },
-  {
-    key: 'lighting',
-    label: t('Lighting'),
-    description: t('lighting.json: level and colour of every light'),
-  },
-  { key: 'relit', label: t('Scene'), description: t('relit.xml: the scene with this lighting') },
-  {
-    key: 'report',
-    label: t('Report'),
-    description: t('answer/report.html: painting, answer and analysis'),
-  },
+  ['target', t('Painting'), t('painting.exr, for lightpaint solve')],
+  ['layers', t('Layers'), t('layers.exr and layers.ora, for Krita and others')],
+  ['picture', t('Picture'), t('answer.png: the answer as a picture')],
+  ['lighting', t('Lighting'), t('lighting.json: level and colour of every light')],
+  ['relit', t('Scene'), t('relit.xml: the scene with this lighting')],
+  ['report', t('Report'), t('answer/report.html: painting, answer and analysis')],
 ];
 
 /** Exports that are not ticked at first: few people need them. @type {string[]} */
@@ -57,12 +39,12 @@ const UNPAINTED_TEXT = t('Nothing is painted yet, so no painting, layers or repo
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 function ExportDialog({ ui, app, close }) {
   const available = EXPORTS.filter(
-    ({ key }) =>
+    ([key]) =>
       (key !== 'relit' || ui.state?.can_render) &&
       (key !== 'report' || ui.state?.can_report !== false),
   );
   const [outputs, setOutputs] = useState(
-    available.map(({ key }) => key).filter((key) => !UNTICKED.includes(key)),
+    available.map(([key]) => key).filter((key) => !UNTICKED.includes(key)),
   );
   const [name, setName] = useState(() => suggestedName(ui));
   const isBusy = ui.isExporting;
@@ -72,7 +54,7 @@ function ExportDialog({ ui, app, close }) {
     <${ExportKind} value="export" app=${app} />
     <${ExportName} name=${name} change=${setName} />
     ${available.map(
-      ({ key, label, description }) => html`<div class="export-row" key=${key}>
+      ([key, label, description]) => html`<div class="export-row" key=${key}>
       <${Checkbox} label=${label} checked=${outputs.includes(key)} 
         change=${() => setOutputs(toggled(outputs, key))} />
       <span class="faint">${description}</span></div>`,
@@ -174,3 +156,13 @@ function timeText({ seconds, is_measured: isMeasured }) {
     ? t('About {time}, as an earlier search here.', { time })
     : t('About {time}.', { time });
 }
+
+/** The dialogs by what opens them. */
+const DIALOGS = {
+  keys: ShortcutsDialog,
+  export: ExportDialog,
+  render: FinalRenderDialog,
+  move: MoveDialog,
+  looks: LooksDialog,
+  presets: PresetsDialog,
+};

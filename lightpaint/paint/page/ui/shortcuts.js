@@ -68,162 +68,109 @@ export function escape({ engine, store }) {
   });
 }
 
+/** @param {CommandKey["command"]} command @param {string} description @param {CommandKey["act"]} act
+ * @param {boolean} [isOnce] @returns {CommandKey} */
+const key = (command, description, act, isOnce) => ({ command, description, act, isOnce });
+
+/** @param {string} description @param {string[]} symbols @returns {FixedKey} */
+const fixed = (description, ...symbols) => ({ symbols, description });
+
 /** All shortcuts, by their effect. @type {{title: string, keys: (CommandKey | FixedKey)[]}[]} */
 export const SHORTCUTS = [
   {
     title: t('Tools'),
-    keys: TOOLS.map(({ tool, label }) => ({
-      command: tool,
-      description: label,
-      act: ({ store }) => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool)),
-    })),
+    keys: TOOLS.map(({ tool, label }) =>
+      key(tool, label, ({ store }) =>
+        tool === 'select' ? chooseSelect(store) : chooseTool(store, tool),
+      ),
+    ),
   },
   {
     title: t('General'),
     keys: [
-      {
-        command: 'saveLook',
-        description: t('save look'),
-        act: (app) => void saveLook(app),
-        isOnce: true,
-      },
-      { symbols: ['Ctrl', 'V'], description: t('add a copied picture to the references') },
-      {
-        command: 'panels',
-        description: t('show or hide panels'),
-        act: ({ store }) => togglePanels(store),
-      },
-      {
-        command: 'lights',
-        description: t('mark the lights, and move them'),
-        act: ({ store, session }) => {
-          if (store.value.state?.can_render) session.toggleLamps();
-        },
-      },
-      {
-        command: 'shortcuts',
-        description: t('show these shortcuts'),
-        act: ({ store }) => store.set({ dialog: 'keys' }),
-      },
-      { symbols: ['Tab'], description: t('next control') },
-      {
-        symbols: ['← ↑ ↓ →'],
-        description: t('move the brush on the pictures; Enter paints'),
-      },
-      { symbols: ['Shift', 'Enter'], description: t('there, a line from the last stroke') },
+      key('saveLook', t('save look'), (app) => void saveLook(app), true),
+      fixed(t('add a copied picture to the references'), 'Ctrl', 'V'),
+      key('panels', t('show or hide panels'), ({ store }) => togglePanels(store)),
+      key('lights', t('mark the lights, and move them'), ({ store, session }) => {
+        if (store.value.state?.can_render) session.toggleLamps();
+      }),
+      key('shortcuts', t('show these shortcuts'), ({ store }) => store.set({ dialog: 'keys' })),
+      fixed(t('next control'), 'Tab'),
+      fixed(t('move the brush on the pictures; Enter paints'), '← ↑ ↓ →'),
+      fixed(t('there, a line from the last stroke'), 'Shift', 'Enter'),
     ],
   },
   {
     title: t('Brush'),
     keys: [
-      { command: 'smaller', description: t('smaller'), act: ({ store }) => resizeBrush(store, -1) },
-      { command: 'larger', description: t('larger'), act: ({ store }) => resizeBrush(store, 1) },
-      { command: 'softer', description: t('softer'), act: ({ store }) => hardenBrush(store, -1) },
-      { command: 'harder', description: t('harder'), act: ({ store }) => hardenBrush(store, 1) },
-      { symbols: ['1', '…', '9', '0'], description: t('flow 10 % to 100 %') },
-      { command: 'swap', description: t('swap colours'), act: ({ store }) => swapColours(store) },
-      { symbols: ['Alt', t('click')], description: t('pick light from the picture') },
-      { symbols: ['Shift', t('click')], description: t('line from the last stroke') },
-      { symbols: ['Esc'], description: t('cancel the stroke, or the drag of a light') },
-      {
-        command: 'undo',
-        description: t('undo'),
-        // Undo first cancels the current stroke, which is the last action.
-        act: ({ engine, session, store }) => {
-          if (engine.cancel()) store.set({ dragAdjustment: null });
-          else void session.send('undo');
-        },
-      },
-      { command: 'redo', description: t('redo'), act: ({ session }) => void session.send('redo') },
+      key('smaller', t('smaller'), ({ store }) => resizeBrush(store, -1)),
+      key('larger', t('larger'), ({ store }) => resizeBrush(store, 1)),
+      key('softer', t('softer'), ({ store }) => hardenBrush(store, -1)),
+      key('harder', t('harder'), ({ store }) => hardenBrush(store, 1)),
+      fixed(t('flow 10 % to 100 %'), '1', '…', '9', '0'),
+      key('swap', t('swap colours'), ({ store }) => swapColours(store)),
+      fixed(t('pick light from the picture'), 'Alt', t('click')),
+      fixed(t('line from the last stroke'), 'Shift', t('click')),
+      fixed(t('cancel the stroke, or the drag of a light'), 'Esc'),
+      // Undo first cancels the current stroke, which is the last action.
+      key('undo', t('undo'), ({ engine, session, store }) => {
+        if (engine.cancel()) store.set({ dragAdjustment: null });
+        else void session.send('undo');
+      }),
+      key('redo', t('redo'), ({ session }) => void session.send('redo')),
     ],
   },
   {
     title: t('Selection'),
     keys: [
-      {
-        command: 'selectAll',
-        description: t('select all'),
-        act: ({ engine }) => void engine.selections.select({ kind: 'all' }),
-      },
-      {
-        command: 'selectNone',
-        description: t('select nothing'),
-        act: ({ engine }) => engine.selections.change({ kind: 'none' }),
-      },
-      {
-        command: 'invert',
-        description: t('invert the selection'),
-        act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
-      },
-      { symbols: ['Shift', t('drag')], description: t('add to the selection') },
-      { symbols: ['Alt', t('drag')], description: t('subtract from it') },
-      { symbols: ['Shift', 'Alt', t('drag')], description: t('intersect with it') },
+      key('selectAll', t('select all'), ({ engine }) => {
+        void engine.selections.select({ kind: 'all' });
+      }),
+      key('selectNone', t('select nothing'), ({ engine }) =>
+        engine.selections.change({ kind: 'none' }),
+      ),
+      key('invert', t('invert the selection'), ({ engine }) =>
+        engine.selections.change({ kind: 'invert' }),
+      ),
+      fixed(t('add to the selection'), 'Shift', t('drag')),
+      fixed(t('subtract from it'), 'Alt', t('drag')),
+      fixed(t('intersect with it'), 'Shift', 'Alt', t('drag')),
     ],
   },
   {
     title: t('Pictures'),
     keys: [
-      { symbols: ['Space', t('drag')], description: t('pan') },
-      { symbols: ['Ctrl', t('wheel')], description: t('zoom') },
-      { command: 'zoomIn', description: t('zoom in'), act: zoomBy(1.25) },
-      { command: 'zoomOut', description: t('zoom out'), act: zoomBy(0.8) },
-      {
-        command: 'fit',
-        description: t('fit to window'),
-        act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
-      },
-      { command: 'pixels', description: t('100 %'), act: showPixels },
-      {
-        command: 'layout',
-        description: t('side by side, wipe, blink, inset'),
-        act: ({ store }) =>
-          updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
-      },
-      { command: 'nextView', description: t('next view, if there are several'), act: showNextView },
-      {
-        command: 'blink',
-        description: t('switch the picture in blink, the large one with an inset'),
-        act: ({ store }) => {
-          const { layout, blink } = store.value.display;
-          if (layout === 'inset') return swapInset(store);
-          updateDisplay(store, { layout: 'blink', blink: blink === 'left' ? 'right' : 'left' });
-        },
-      },
-      {
-        command: 'previous',
-        description: t('hold: the answer before the last step'),
-        act: (app) => void showPrevious(app),
-        isOnce: true,
-      },
-      {
-        command: 'original',
-        description: t('hold: the original scene'),
-        act: showOriginal,
-        isOnce: true,
-      },
-      {
-        command: 'lowerExposure',
-        description: t('lower display exposure'),
-        act: changeExposure(-0.5),
-      },
-      {
-        command: 'raiseExposure',
-        description: t('raise display exposure'),
-        act: changeExposure(0.5),
-      },
-      {
-        command: 'denoise',
-        description: t('denoise on or off'),
-        act: ({ store }) => updateDisplay(store, { clean: !store.value.display.clean }),
-      },
-      {
-        command: 'overlay',
-        description: t('next overlay'),
-        act: ({ store }) =>
-          updateDisplay(store, {
-            overlay: nextValue(overlaysOf(store.value), store.value.display.overlay),
-          }),
-      },
+      fixed(t('pan'), 'Space', t('drag')),
+      fixed(t('zoom'), 'Ctrl', t('wheel')),
+      key('zoomIn', t('zoom in'), zoomBy(1.25)),
+      key('zoomOut', t('zoom out'), zoomBy(0.8)),
+      key('fit', t('fit to window'), ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] })),
+      key('pixels', t('100 %'), showPixels),
+      key('layout', t('side by side, wipe, blink, inset'), ({ store }) =>
+        updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
+      ),
+      key('nextView', t('next view, if there are several'), showNextView),
+      key('blink', t('switch the picture in blink, the large one with an inset'), ({ store }) => {
+        const { layout, blink } = store.value.display;
+        if (layout === 'inset') return swapInset(store);
+        updateDisplay(store, { layout: 'blink', blink: blink === 'left' ? 'right' : 'left' });
+      }),
+      key(
+        'previous',
+        t('hold: the answer before the last step'),
+        (app) => void showPrevious(app),
+        true,
+      ),
+      key('original', t('hold: the original scene'), showOriginal, true),
+      key('lowerExposure', t('lower display exposure'), changeExposure(-0.5)),
+      key('raiseExposure', t('raise display exposure'), changeExposure(0.5)),
+      key('denoise', t('denoise on or off'), ({ store }) =>
+        updateDisplay(store, { clean: !store.value.display.clean }),
+      ),
+      key('overlay', t('next overlay'), ({ store }) => {
+        const overlay = nextValue(overlaysOf(store.value), store.value.display.overlay);
+        updateDisplay(store, { overlay });
+      }),
     ],
   },
 ];

@@ -6,48 +6,37 @@ import { t } from '../language/language.js';
 
 /** @import { Display, RGB, Tool, Ui, UiStore } from './ui_state.js' */
 
-/** @type {{tool: Tool, label: string, icon: string, tip: string}[]} */
+/** @param {Tool} tool @param {string} label @param {string} tip @param {string} [icon] */
+const described = (tool, label, tip, icon = tool) => ({ tool, label, icon, tip });
+
 export const TOOLS = [
-  { tool: 'brush', label: t('Brush'), icon: 'brush', tip: t('Brush: paint light') },
-  {
-    tool: 'eraser',
-    label: t('Eraser'),
-    icon: 'eraser',
-    tip: t('Eraser: remove paint. Unpainted parts stay near their current look.'),
-  },
-  {
-    tool: 'weight',
-    label: t('Importance'),
-    icon: 'weight',
-    tip: t('Importance: where the answer must match best'),
-  },
-  { tool: 'pick', label: t('Picker'), icon: 'pick', tip: t('Picker: take paint from a picture') },
-  {
-    tool: 'neutral',
-    label: t('Neutral'),
-    icon: 'neutral',
-    tip: t('Neutral: press what should be white or grey, and the rest follows'),
-  },
-  { tool: 'fill', label: t('Fill'), icon: 'fill', tip: t('Fill: paint a whole object') },
-  { tool: 'line', label: t('Line'), icon: 'line', tip: t('Line: paint a straight line') },
-  {
-    tool: 'adjust',
-    label: t('Adjust'),
-    icon: 'adjust',
-    tip: t('Adjust: drag up for brighter, right for warmer'),
-  },
-  {
-    tool: 'gradient',
-    label: t('Gradient'),
-    icon: 'gradient',
-    tip: t('Gradient: light that falls off from one place to another'),
-  },
-  {
-    tool: 'select',
-    label: t('Select'),
-    icon: 'marquee',
-    tip: t('Select: paint and adjust only there. Again for the next shape.'),
-  },
+  described('brush', t('Brush'), t('Brush: paint light')),
+  described(
+    'eraser',
+    t('Eraser'),
+    t('Eraser: remove paint. Unpainted parts stay near their current look.'),
+  ),
+  described('weight', t('Importance'), t('Importance: where the answer must match best')),
+  described('pick', t('Picker'), t('Picker: take paint from a picture')),
+  described(
+    'neutral',
+    t('Neutral'),
+    t('Neutral: press what should be white or grey, and the rest follows'),
+  ),
+  described('fill', t('Fill'), t('Fill: paint a whole object')),
+  described('line', t('Line'), t('Line: paint a straight line')),
+  described('adjust', t('Adjust'), t('Adjust: drag up for brighter, right for warmer')),
+  described(
+    'gradient',
+    t('Gradient'),
+    t('Gradient: light that falls off from one place to another'),
+  ),
+  described(
+    'select',
+    t('Select'),
+    t('Select: paint and adjust only there. Again for the next shape.'),
+    'marquee',
+  ),
 ];
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
