@@ -296,6 +296,13 @@ class Problem(linear_problem.LinearProblem):
             return self.equations.objective(weights)
         return LitPixels.whole(self.basis, self.loss).objective(weights)
 
+    def unsolved(self, **changes: Any) -> "Problem":
+        """Return the problem before a solve, with other fields: all lights, and all of the noise in
+        its equations.
+        """
+        whole = replace(self, reduction=self.full, corrected=None, noise_removed=0.0)
+        return replace(whole, **changes)
+
     def with_paintings(self, images: Sequence[Floats]) -> "Problem":
         """Return the problem of the same demands with other paintings of light, before a solve.
 
@@ -348,7 +355,7 @@ def _with_bases(problem: Problem, bases: Sequence[Basis]) -> Problem:
     """Return the same demands on other planes of the same lights. bases: of each view."""
     whole, parts = joint_basis(bases)
     pictures = _pictures(whole, Views(parts, problem.views.targets), problem.fit)
-    return replace(problem, **pictures, reduction=problem.full, corrected=None, noise_removed=0.0)
+    return problem.unsolved(**pictures)
 
 
 def _pictures(whole: Basis, views: Views, fit: Fit) -> dict[str, Any]:

@@ -225,7 +225,8 @@ def run_rounds(
     from_clipping = from_clipping and pixels.has_clipping
     is_curved = pixels.has_curvature and (from_clipping or not own_squares)
     w, x = start, lit.predicted(start)
-    value, in_the_dark = total_loss(pixels, terms, w, x), _loss_in_the_dark(pixels, x)
+    value = total_loss(pixels, terms, w, x)
+    in_the_dark = float(pixels.objective(np.zeros_like(x)).sum())
     count, matrix, keeps_matrix = 0, None, lit.planes.count >= MANY_LIGHTS
     while True:
         kind = {"from_clipping": from_clipping, "is_curved": is_curved}
@@ -344,11 +345,6 @@ def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> fl
 def total_loss(pixels: PixelLoss, terms: WeightTerms, w: Doubles, x: Doubles) -> float:
     """Return the loss of a picture x, (3, p), with the terms in its weights, (n, 3)."""
     return float(pixels.objective(x).sum()) + terms.value(w)
-
-
-def _loss_in_the_dark(pixels: PixelLoss, x: Doubles) -> float:
-    """Return the loss of a black picture like x, (3, p)."""
-    return float(pixels.objective(np.zeros_like(x)).sum())
 
 
 def _line_search(

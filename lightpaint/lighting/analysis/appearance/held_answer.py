@@ -77,9 +77,12 @@ def hold_to_current(
     def picture_of(answer: Solution) -> Floats:
         return problem.basis.mix(answer.weights)
 
+    def answer_held(strength: float) -> Solution:
+        return finish(solution_of(problem.unsolved(holding=holding_pull(problem, strength))))
+
     held, _ = closest_to_paint(
         solution,
-        lambda strength: finish(solution_of(_pulled(problem, strength))),
+        answer_held,
         difference=lambda answer: difference_of(picture_of(answer)),
         difference_now=difference_of(now),
         have_come=lambda answer: have_wishes_come(
@@ -93,17 +96,6 @@ def holding_pull(problem: LinearProblem, strength: float) -> NormalEquations:
     """Return the pull to the current lights of a strength of `PULLS`."""
     power = strength * problem.fit.brightness * problem.painted_share * problem.power
     return pull_to_current(power, problem.reference)
-
-
-def _pulled(problem: Problem, strength: float) -> Problem:
-    """Return a problem with a pull to the current lights, before it is solved."""
-    return replace(
-        problem,
-        reduction=problem.full,
-        holding=holding_pull(problem, strength),
-        corrected=None,
-        noise_removed=0.0,
-    )
 
 
 def answer_released(problem: Problem, holding: NormalEquations | None) -> Solution:

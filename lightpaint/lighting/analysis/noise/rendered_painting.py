@@ -130,7 +130,7 @@ def answer_to_render(
         return answer_without_filter(solution, finish)
     plain = solution
     if problem.contrast is not None:
-        plain = finish(solution_of(_without_contrast(problem)))
+        plain = finish(solution_of(problem.unsolved(contrast=None)))
     found = answer_without_filter(plain, finish)
     if found is not plain:
         return found
@@ -148,13 +148,6 @@ def may_be_render(problem: Problem) -> bool:
         and problem.block_side == 1
         and problem.fit.reads_wishes(is_sketch=are_sketches(problem.views))
         and all(target.is_whole or not target.over_look for target in problem.views.targets)
-    )
-
-
-def _without_contrast(problem: Problem) -> Problem:
-    """Return a problem without contrasts between wishes, before it is solved."""
-    return replace(
-        problem, reduction=problem.full, contrast=None, corrected=None, noise_removed=0.0
     )
 
 
@@ -336,16 +329,8 @@ def _without(problem: Problem, change: Doubles, share: float) -> Problem:
     ]
     other = problem.with_paintings(images)
     reading = ViewsReading(other.views, other.power, other.reference, other.fit, other.constraints)
-    terms = reading.terms()
-    return replace(
-        other,
-        reduction=problem.full,
-        corrected=None,
-        noise_removed=0.0,
-        filter_share=share,
-        is_render=True,
-        **vars(replace(terms, contrast=None)),
-    )
+    own_terms = vars(replace(reading.terms(), contrast=None))
+    return other.unsolved(filter_share=share, is_render=True, **own_terms)
 
 
 def _filter_of(solution: Solution, taken: FilterEffect | None) -> tuple[float, FilterEffect] | None:
