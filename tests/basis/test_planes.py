@@ -288,14 +288,7 @@ class CountedPlanes(file_planes.RowPlanes):
 
     def __init__(self, images: np.ndarray) -> None:
         self._images, self.largest = images, 0
-
-    @property
-    def count(self) -> int:
-        return len(self._images)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self._images.shape[1], self._images.shape[2]
+        self.count, self.size = len(images), (images.shape[1], images.shape[2])
 
     def plane(self, i: int) -> np.ndarray:
         self.largest = max(self.largest, self._images[i].nbytes)
