@@ -23,6 +23,7 @@ from lightpaint.relit.formats import spectra_csv
 from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
+from lightpaint.sentences import Hint
 
 
 @pytest.fixture
@@ -88,8 +89,9 @@ def test_a_lamp_without_spectra_is_named(room: Path):
     write_rgb(room.with_name("painting.exr"), np.ones((20, 24, 3), np.float32))
     file = room.with_name("room.lights.toml")
     file.write_text('lights = ["panel"]\n')
-    with pytest.raises(SceneError, match="has no emitters for light 'panel'"):
+    with pytest.raises(SceneError, match="has no emitters for light 'panel'") as refusal:
         _job(room, room.with_name("painting.exr"))
+    assert Hint("lights") in refusal.value.sentence.parts  # the command line writes --lights
     file.write_text('[light.panel]\nemitters = [{name = "a", xy = [0.3, 0.3], Y = 1}]\n')
     with pytest.raises(SceneError, match="no spectrum of a for light 'panel'"):
         _job(room, room.with_name("painting.exr"))

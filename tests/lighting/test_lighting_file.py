@@ -138,6 +138,13 @@ def test_a_colour_that_is_none(good_file: tuple[Path, dict[str, Any]], key: str,
         read_lighting(path)
 
 
+def test_another_json_is_refused_as_a_lighting(tmp_path: Path):
+    path = tmp_path / "lighting.json"
+    path.write_text('{"lamp": 1}')
+    with pytest.raises(LightingError, match=r"json is not a lighting: expected a lighting\.json"):
+        read_lighting(path)
+
+
 @pytest.mark.parametrize(
     "change",
     [

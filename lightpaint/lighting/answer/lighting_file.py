@@ -121,6 +121,8 @@ def read_lighting(path: str | Path) -> Lighting:
     except ValueError as error:
         raise LightingError(f"{path} is not a JSON file: {one_line(str(error))}") from None
     format_found = data.get("format") if isinstance(data, dict) else None
+    if format_found is None:
+        raise LightingError(f"{path} is not a lighting: expected a lighting.json that solve wrote")
     if format_found != FORMAT:
         raise LightingError(
             f"{path} has the format {one_line(repr(format_found))}: expected {FORMAT!r}"

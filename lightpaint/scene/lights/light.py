@@ -14,6 +14,7 @@ from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import with_texels
 from lightpaint.scene.plane_identity import combined_identity
 from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
+from lightpaint.sentences import Hint
 
 #: Parameter of a light whose emission is a multiple of that in the scene.
 WHOLE_EMISSION = "emission"
@@ -357,12 +358,14 @@ def _check_lamp(light: Light, lamp: Lamp | None, scene: str) -> None:
     if light.unit == MULTIPLE:
         raise SceneError(
             f"{scene}: light {light.name!r} is an image, or several lights of different colours, "
-            "and renders with spectra adjust lights of one colour: keep it as it is, by `lights`"
+            "and renders with spectra adjust lights of one colour: keep it as it is, by ",
+            Hint("lights"),
         )
     missing = [] if lamp is None else [x.name for x in lamp.emitters if x.spectrum is None]
     if lamp is None or missing:
         what = "no emitters" if lamp is None else f"no spectrum of {some_names(missing)}"
         raise SceneError(
             f"{scene}: the lights file has {what} for light {light.name!r}, and a render with "
-            "spectra needs them: add them, or keep the light as it is, by `lights`"
+            "spectra needs them: add them, or keep the light as it is, by ",
+            Hint("lights"),
         )
