@@ -1,7 +1,7 @@
 /** The panel that shows where and why the answer differs, and verifies it with a render. */
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
-import { Button, Choice, ProgressBar } from './controls.js';
+import { Button, Choice, ProgressBar, option } from './controls.js';
 import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
@@ -14,16 +14,12 @@ import { SCALE_GRADIENT } from './planes/plane_picture.js';
 /** @import { App, Pane, Ui } from './ui_state.js' */
 
 const OVERLAYS = [
-  { value: null, label: t('None') },
-  { value: 'missed', label: t('Difference'), tip: t('Where the answer differs from the painting') },
-  { value: 'beyond', label: t('Out of reach'), tip: t('What no setting of these lights can do') },
-  { value: 'falsecolor', label: t('False colour'), tip: t('Brightness in stops') },
-  {
-    value: 'importance',
-    label: t('Importance'),
-    tip: t('What is painted, and how much it counts'),
-  },
-  { value: 'lux', label: t('Lux'), tip: t('Illuminance on the measuring planes') },
+  option(null, t('None')),
+  option('missed', t('Difference'), t('Where the answer differs from the painting')),
+  option('beyond', t('Out of reach'), t('What no setting of these lights can do')),
+  option('falsecolor', t('False colour'), t('Brightness in stops')),
+  option('importance', t('Importance'), t('What is painted, and how much it counts')),
+  option('lux', t('Lux'), t('Illuminance on the measuring planes')),
 ];
 
 const PAINTED_LABEL = t('painted');

@@ -2,6 +2,7 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
+import { option } from './controls.js';
 import { numberText } from './format.js';
 import { knownShares, percentOf } from './layers/layer_delivery.js';
 import { Thumbnail } from './thumbnail.js';
@@ -11,23 +12,19 @@ import { t } from '../language/language.js';
 /** @import { AnswerChoice, Events } from '../engine/messages.js' */
 
 /** From the least freedom of the lamps to the most. */
-const CHOICES = /** @type {const} */ ([
-  {
-    colors: 'own',
-    label: t('Own colours'),
-    tip: t('Lamps keep the colours they have, and only get brighter or dimmer.'),
-  },
-  {
-    colors: 'gentle',
-    label: t('As painted'),
-    tip: t('Lamps take the whites and colours that the painting asks for.'),
-  },
-  {
-    colors: 'free',
-    label: t('Bold'),
-    tip: t('Lamps may take any hue that is white, painted or their own.'),
-  },
-]);
+const CHOICES = [
+  option(
+    'own',
+    t('Own colours'),
+    t('Lamps keep the colours they have, and only get brighter or dimmer.'),
+  ),
+  option(
+    'gentle',
+    t('As painted'),
+    t('Lamps take the whites and colours that the painting asks for.'),
+  ),
+  option('free', t('Bold'), t('Lamps may take any hue that is white, painted or their own.')),
+];
 
 /** Take the choices of the session. @param {Events["choices"]} message
  * @param {Ui} ui @returns {Partial<Ui>} */
@@ -45,14 +42,14 @@ export function AnswerChoices({ ui, app }) {
     ${CHOICES.map((choice) => {
       const answer = isUnpainted
         ? undefined
-        : ui.choices.find(({ colors }) => colors === choice.colors);
-      return html`<${ChoiceButton} key=${choice.colors} ...${choice} answer=${answer} ui=${ui} app=${app} />`;
+        : ui.choices.find(({ colors }) => colors === choice.value);
+      return html`<${ChoiceButton} key=${choice.value} ...${choice} answer=${answer} ui=${ui} app=${app} />`;
     })}
   </div>`;
 }
 
-/** @param {{colors: string, label: string, tip: string, answer?: AnswerChoice, ui: Ui, app: App}} props */
-function ChoiceButton({ colors, label, tip, answer, ui, app }) {
+/** @param {{value: string, label: string, tip: string, answer?: AnswerChoice, ui: Ui, app: App}} props */
+function ChoiceButton({ value: colors, label, tip, answer, ui, app }) {
   const isChosen = ui.effectiveSettings.colors === colors;
   const picture = nameInView(`choice/${colors}`, ui.view);
   const text = answer ? `${label}. ${deliveredText(answer)}` : `${label}.`;

@@ -49,6 +49,10 @@ export function Button({ icon, label, tip, keys, pressed, disabled, primary, act
   </button>`;
 }
 
+/** One of the choices of `Choice` or `Select`.
+ * @template {string | boolean | null} T @param {T} value @param {string} label @param {string} [tip] */
+export const option = (value, label, tip) => ({ value, label, tip });
+
 /** A choice of one among a few visible options.
  * @param {{label: string, value: any, choices: {value: any, label: string, icon?: string,
  *   tip?: string, keys?: string, disabled?: boolean}[], change: (value: any) => void,

@@ -4,7 +4,7 @@
  */
 
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
-import { Button, Choice, NumberField, Select, useId } from './controls.js';
+import { Button, Choice, NumberField, Select, useId, option } from './controls.js';
 import { capitalized, numberText } from './format.js';
 import { language, languageChoices, storeLanguage, t } from '../language/language.js';
 import { startTour } from './tour.js';
@@ -14,37 +14,25 @@ import { startTour } from './tour.js';
 const AUTOMATIC_TIP = t('The best choice for a painting made here');
 
 const SPACES = [
-  { value: null, label: t('Automatic'), tip: AUTOMATIC_TIP },
-  {
-    value: 'display',
-    label: t('Display'),
-    tip: t('Differences as the eye sees them on a display'),
-  },
-  {
-    value: 'linear',
-    label: t('Linear'),
-    tip: t('Differences in linear light: bright areas count most'),
-  },
+  option(null, t('Automatic'), AUTOMATIC_TIP),
+  option('display', t('Display'), t('Differences as the eye sees them on a display')),
+  option('linear', t('Linear'), t('Differences in linear light: bright areas count most')),
 ];
 const COLOURS = [
-  { value: null, label: t('Automatic'), tip: AUTOMATIC_TIP },
-  { value: 'free', label: t('Free'), tip: t('Any colour') },
-  { value: 'gentle', label: t('Gentle'), tip: t('Their own, unless the paint asks for another') },
-  { value: 'white', label: t('White'), tip: t('Whites from 2200 to 9000 K') },
-  {
-    value: 'own',
-    label: t('Own'),
-    tip: t('Only the colours they have: lamps only get brighter or dimmer'),
-  },
+  option(null, t('Automatic'), AUTOMATIC_TIP),
+  option('free', t('Free'), t('Any colour')),
+  option('gentle', t('Gentle'), t('Their own, unless the paint asks for another')),
+  option('white', t('White'), t('Whites from 2200 to 9000 K')),
+  option('own', t('Own'), t('Only the colours they have: lamps only get brighter or dimmer')),
 ];
 const HOLDS = [
-  { value: 'auto', label: t('Automatic'), tip: AUTOMATIC_TIP },
-  { value: 'hold', label: t('Hold'), tip: t('They stay near their current look') },
-  { value: 'go', label: t('Ignore'), tip: t('They may change freely: only the paint counts') },
+  option('auto', t('Automatic'), AUTOMATIC_TIP),
+  option('hold', t('Hold'), t('They stay near their current look')),
+  option('go', t('Ignore'), t('They may change freely: only the paint counts')),
 ];
 const PAINT_READINGS = [
-  { value: false, label: t('Sketch'), tip: t('Strokes show what should change') },
-  { value: true, label: t('Literal'), tip: t('Each stroke is the exact light you want') },
+  option(false, t('Sketch'), t('Strokes show what should change')),
+  option(true, t('Literal'), t('Each stroke is the exact light you want')),
 ];
 const THEMES = [
   { value: 'system', label: t('System'), tip: t('As the system, or the notebook around it') },
@@ -52,8 +40,8 @@ const THEMES = [
   { value: 'light', label: t('Light', { context: 'theme' }) },
 ];
 const MINOR_LIGHTS = [
-  { value: false, label: t('May change'), tip: t('Every change that brings the answer closer') },
-  { value: true, label: t('Stay'), tip: t('As they are now, unless a change helps much') },
+  option(false, t('May change'), t('Every change that brings the answer closer')),
+  option(true, t('Stay'), t('As they are now, unless a change helps much')),
 ];
 
 /** Short explanations of the choices. @type {Record<string, Record<string, string>>} */

@@ -2,7 +2,7 @@
 
 import { t } from '../../language/language.js';
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { Button, Checkbox, Choice } from '../controls.js';
+import { Button, Checkbox, Choice, option } from '../controls.js';
 import { Thumbnail } from '../thumbnail.js';
 import { PICTURE_ENDINGS, addReference } from './reference_files.js';
 import { ReferencePicture } from './reference_picture.js';
@@ -11,28 +11,12 @@ import { shownPairs, shownReference } from './reference_state.js';
 /** @import { App, Ui } from '../ui_state.js' */
 /** @import { ComparedAreas } from './reference_state.js' */
 
-/** @type {{value: ComparedAreas, label: string, tip: string}[]} */
+/** @type {{value: ComparedAreas, label: string, tip?: string}[]} */
 const AREAS = [
-  {
-    value: 'whole',
-    label: t('Whole'),
-    tip: t('The colour of all of it, of its lit parts and its shadows'),
-  },
-  {
-    value: 'regions',
-    label: t('Regions'),
-    tip: t('Also its top, as ceiling or sky, its middle and its bottom'),
-  },
-  {
-    value: 'parts',
-    label: t('Same view'),
-    tip: t('For a picture of this scene from here: each part, softly'),
-  },
-  {
-    value: 'pairs',
-    label: t('Places'),
-    tip: t('Places that you press, in the reference and in the picture'),
-  },
+  option('whole', t('Whole'), t('The colour of all of it, of its lit parts and its shadows')),
+  option('regions', t('Regions'), t('Also its top, as ceiling or sky, its middle and its bottom')),
+  option('parts', t('Same view'), t('For a picture of this scene from here: each part, softly')),
+  option('pairs', t('Places'), t('Places that you press, in the reference and in the picture')),
 ];
 
 /** @param {{ui: Ui, app: App}} props */

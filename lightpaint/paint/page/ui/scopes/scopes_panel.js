@@ -1,7 +1,7 @@
 /** Scopes of a picture that is shown: histogram, waveform, parade and vectorscope. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
-import { Choice } from '../controls.js';
+import { Choice, option } from '../controls.js';
 import { t } from '../../language/language.js';
 import { drawScope, VECTOR_SIZE } from './scope_drawing.js';
 import { clippedPart, histogram, percentile, placeOf, SKIN_ANGLE, targets } from './scope_arithmetic.js';
@@ -11,33 +11,27 @@ import { clippedPart, histogram, percentile, placeOf, SKIN_ANGLE, targets } from
 /** @import { ScopeKind } from './scope_drawing.js' */
 
 const KINDS = [
-  {
-    value: 'histogram',
-    label: t('Histogram'),
-    tip: t('How much of the picture has each level, in percent of the display'),
-  },
-  {
-    value: 'waveform',
-    label: t('Waveform'),
-    tip: t('Levels of luma from left to right of the picture, in percent of the display'),
-  },
-  {
-    value: 'parade',
-    label: t('Parade'),
-    tip: t('Levels of red, green and blue beside each other'),
-  },
-  {
-    value: 'vectorscope',
-    label: t('Vectorscope'),
-    tip: t(
-      'Hue around the middle, saturation outwards; targets of bars of 75 %, and the line of skin',
-    ),
-  },
+  option(
+    'histogram',
+    t('Histogram'),
+    t('How much of the picture has each level, in percent of the display'),
+  ),
+  option(
+    'waveform',
+    t('Waveform'),
+    t('Levels of luma from left to right of the picture, in percent of the display'),
+  ),
+  option('parade', t('Parade'), t('Levels of red, green and blue beside each other')),
+  option(
+    'vectorscope',
+    t('Vectorscope'),
+    t('Hue around the middle, saturation outwards; targets of bars of 75 %, and the line of skin'),
+  ),
 ];
 const PICTURES = [
-  { value: 'painting', label: t('Painting') },
-  { value: 'solution', label: t('Answer') },
-  { value: 'present', label: t('Original'), tip: t('The picture of the scene as it was') },
+  option('painting', t('Painting')),
+  option('solution', t('Answer')),
+  option('present', t('Original'), t('The picture of the scene as it was')),
 ];
 
 /** Least milliseconds between two scopes, and how many times what one takes lies between them: scopes

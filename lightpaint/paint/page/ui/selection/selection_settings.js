@@ -12,36 +12,25 @@ import { t } from '../../language/language.js';
 
 /** @typedef {Ui["selection"]} SelectionUi */
 
-/** @type {{shape: Shape, label: string, icon: string, hint: string}[]} */
+/** @param {Shape} shape @param {string} label @param {string} hint @param {string} [icon] */
+const shape = (shape, label, hint, icon = shape) => ({ shape, label, icon, hint });
+
 export const SHAPES = [
-  {
-    shape: 'rectangle',
-    label: t('Rectangle'),
-    icon: 'rectangle',
-    hint: t('Drag from corner to corner.'),
-  },
-  {
-    shape: 'ellipse',
-    label: t('Ellipse'),
-    icon: 'ellipse',
-    hint: t('Drag from corner to corner.'),
-  },
-  { shape: 'lasso', label: t('Lasso'), icon: 'lasso', hint: t('Drag around what you want.') },
-  { shape: 'object', label: t('Object'), icon: 'object', hint: t('Click an object.') },
-  { shape: 'colour', label: t('Colour'), icon: 'wand', hint: t('Click a colour in a picture.') },
+  shape('rectangle', t('Rectangle'), t('Drag from corner to corner.')),
+  shape('ellipse', t('Ellipse'), t('Drag from corner to corner.')),
+  shape('lasso', t('Lasso'), t('Drag around what you want.')),
+  shape('object', t('Object'), t('Click an object.')),
+  shape('colour', t('Colour'), t('Click a colour in a picture.'), 'wand'),
 ];
 
-/** @type {{value: Mode, label: string, icon: string, tip: string}[]} */
+/** @param {Mode} value @param {string} label @param {string} tip */
+const mode = (value, label, tip) => ({ value, label, icon: `join-${value}`, tip });
+
 export const MODES = [
-  { value: 'replace', label: t('New'), icon: 'join-replace', tip: t('Select only the new part') },
-  { value: 'add', label: t('Add'), icon: 'join-add', tip: t('Add to the selection (Shift)') },
-  { value: 'subtract', label: t('Subtract'), icon: 'join-subtract', tip: t('Take from it (Alt)') },
-  {
-    value: 'intersect',
-    label: t('Intersect'),
-    icon: 'join-intersect',
-    tip: t('Keep what is in both (Shift Alt)'),
-  },
+  mode('replace', t('New'), t('Select only the new part')),
+  mode('add', t('Add'), t('Add to the selection (Shift)')),
+  mode('subtract', t('Subtract'), t('Take from it (Alt)')),
+  mode('intersect', t('Intersect'), t('Keep what is in both (Shift Alt)')),
 ];
 
 /** @param {UiStore} store @param {Partial<SelectionUi>} changes */
