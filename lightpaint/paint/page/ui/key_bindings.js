@@ -19,6 +19,14 @@ const NAMES = {
   Delete: t('Delete', { context: 'key' }),
 };
 
+/** Steps (x, y) of the arrow keys. @type {Record<string, [number, number]>} */
+export const ARROW_STEPS = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1],
+};
+
 /** Return the name of a key. @param {string} key */
 export const keyName = (key) => NAMES[key] ?? key;
 

@@ -5,6 +5,7 @@ import { clearProbe } from './brush_cursor.js';
 import { isTyping } from './keyboard.js';
 import { pointLamp } from './lamp_fields.js';
 import { paneAt } from './pointer_input.js';
+import { ARROW_STEPS } from './key_bindings.js';
 
 /** @import { App } from './ui_state.js' */
 /** @import { Pointer } from './pointer_input.js' */
@@ -70,12 +71,7 @@ export function useStageInput(frame, pointer, app) {
  * @param {KeyboardEvent} event @param {Pointer} pointer @param {App} app */
 function handleBrushKey(event, pointer, app) {
   const { engine, store } = app;
-  const direction = /** @type {Record<string, [number, number]>} */ ({
-    ArrowLeft: [-1, 0],
-    ArrowRight: [1, 0],
-    ArrowUp: [0, -1],
-    ArrowDown: [0, 1],
-  })[event.key];
+  const direction = ARROW_STEPS[event.key];
   if ((!direction && event.key !== 'Enter') || event.target !== event.currentTarget) return;
   event.preventDefault();
   const element = /** @type {HTMLElement} */ (event.currentTarget);

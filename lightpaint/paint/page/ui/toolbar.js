@@ -4,7 +4,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { toHex } from '../../../viewer/drawing/colour.js';
 import { displayColour } from './colour_panel.js';
-import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
+import { Button, Choice, NumberField, Select, Slider, reveal, option } from './controls.js';
 import { signedText } from './format.js';
 import { GradientOptions } from './selection/gradient_options.js';
 import { SelectOptions } from './selection/select_options.js';
@@ -47,12 +47,8 @@ const areasOf = ({ state, selection }) => [
   ...AREAS.filter(({ value }) => value === 'spot' || state?.objects?.length > 0),
 ];
 const PAINT_MODES = [
-  {
-    value: 'light',
-    label: t('Light'),
-    tip: t('Paint the light on a surface: its own colour stays visible'),
-  },
-  { value: 'colour', label: t('Colour'), tip: t('Paint the final colour, as it should appear') },
+  option('light', t('Light'), t('Paint the light on a surface: its own colour stays visible')),
+  option('colour', t('Colour'), t('Paint the final colour, as it should appear')),
 ];
 
 /** @param {{ui: Ui, app: App}} props */

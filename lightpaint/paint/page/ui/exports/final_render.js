@@ -28,18 +28,10 @@ const [MIN_WIDTH, MAX_WIDTH, MAX_SPP] = [16, 2 ** 14, 2 ** 16];
  * @type {{width: number, spp: number, formats: Request["formats"]}} */
 let lastSettings = { width: 1920, spp: 256, formats: ['exr', 'png'] };
 
-/** @type {{format: "exr" | "png", label: string, description: string}[]} */
+/** @type {[format: "exr" | "png", label: string, description: string][]} */
 const FORMATS = [
-  {
-    format: 'exr',
-    label: t('EXR'),
-    description: t('render.exr: linear light as rendered, its noise, and a denoised layer'),
-  },
-  {
-    format: 'png',
-    label: t('PNG, 16 bits'),
-    description: t('render.png: denoised, through the view and exposure of the scene'),
-  },
+  ['exr', t('EXR'), t('render.exr: linear light as rendered, its noise, and a denoised layer')],
+  ['png', t('PNG, 16 bits'), t('render.png: denoised, through the view and exposure of the scene')],
 ];
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
@@ -84,7 +76,7 @@ function RenderSettings({ ui, app, disabled }) {
         disabled=${disabled} change=${(/** @type {number} */ value) => set({ spp: value })}
         tip=${t('Twice as many take twice the time and leave 0.7 times the noise')} /><span class="faint">${t('per pixel')}</span></div>
     ${FORMATS.map(
-      ({ format, label, description }) => html`<div class="export-row" key=${format}>
+      ([format, label, description]) => html`<div class="export-row" key=${format}>
         <${Checkbox} label=${label} checked=${formats.includes(format)} disabled=${disabled}
           change=${() => set({ formats: toggled(formats, format) })} />
         <span class="faint">${description}</span></div>`,

@@ -1,7 +1,7 @@
 /** The texels of an image, to be painted, locked and released on its map. */
 
 import { ColourMixer } from '../colour_mixers.js';
-import { Button, Choice, Slider, useId } from '../controls.js';
+import { Button, Choice, Slider, useId, option } from '../controls.js';
 import { signedText, whiteText } from '../format.js';
 import { stopsOf } from '../level_field.js';
 import { atFullBrightness, toHex, toKelvin } from '../../../../viewer/drawing/colour.js';
@@ -35,30 +35,20 @@ import {
 /** @import { SkyView } from './sky_marks.js' */
 
 const TOOLS = [
-  {
-    value: 'paint',
-    label: t('Paint'),
-    tip: t('Give texels the colour below, and lock them there'),
-  },
-  {
-    value: 'fill',
-    label: t('Fill'),
-    tip: t('Give all texels above the horizon, or below it, the colour below'),
-  },
-  {
-    value: 'gradient',
-    label: t('Gradient'),
-    tip: t('Drag from where the colour below begins to where it has become the second one'),
-  },
-  {
-    value: 'sun',
-    label: t('Sun'),
-    tip: t(
-      'Add a sun: at 0 stops it gives a surface as much light as an even sky of the mean does',
-    ),
-  },
-  { value: 'lock', label: t('Lock'), tip: t('Lock texels as they are in the answer') },
-  { value: 'release', label: t('Release'), tip: t('Let the solve set texels again') },
+  option('paint', t('Paint'), t('Give texels the colour below, and lock them there')),
+  option('fill', t('Fill'), t('Give all texels above the horizon, or below it, the colour below')),
+  option(
+    'gradient',
+    t('Gradient'),
+    t('Drag from where the colour below begins to where it has become the second one'),
+  ),
+  option(
+    'sun',
+    t('Sun'),
+    t('Add a sun: at 0 stops it gives a surface as much light as an even sky of the mean does'),
+  ),
+  option('lock', t('Lock'), t('Lock texels as they are in the answer')),
+  option('release', t('Release'), t('Let the solve set texels again')),
 ];
 
 /** The tools that use paint. @type {Ui["texelTool"][]} */

@@ -6,6 +6,7 @@ import { html, useRef, useState } from '../../vendor/preact.js';
 import { Thumbnail } from '../thumbnail.js';
 import { pickPaint } from '../tools.js';
 import { shownPairs } from './reference_state.js';
+import { ARROW_STEPS } from '../key_bindings.js';
 
 /** @import { App, Pane, RGB, Ui } from '../ui_state.js' */
 /** @import { ReferenceInfo } from '../../engine/messages.js' */
@@ -53,12 +54,7 @@ export function ReferencePicture({ reference, ui, app }) {
     act(place, event.altKey || ui.tool === 'pick');
   };
   const key = (/** @type {KeyboardEvent} */ event) => {
-    const step = {
-      ArrowLeft: [-1, 0],
-      ArrowRight: [1, 0],
-      ArrowUp: [0, -1],
-      ArrowDown: [0, 1],
-    }[event.key];
+    const step = ARROW_STEPS[event.key];
     if (!step && event.key !== 'Enter') return;
     event.preventDefault();
     event.stopPropagation();
