@@ -230,13 +230,15 @@ def test_a_real_painter_looks_like_a_picture_from_the_clipboard(
     give(page, "paste", "dusk.png", png(), "body")
     page.locator(".reference-picture canvas[width='40']").wait_for()
     # Its light is picked as paint: of the brightest rows, nearly of this colour.
+    before = page.locator(".colour input[type=text]").first.input_value()
     page.keyboard.down("Alt")
     page.mouse.click(*at(page, ".reference-picture", 0.5, 0.02))
     page.keyboard.up("Alt")
     page.wait_for_function(
-        "() => /^#ff/.test(document.querySelector('.colour input[type=text]').value)"
+        "old => document.querySelector('.colour input[type=text]').value !== old", arg=before
     )
     shown = page.locator(".colour input[type=text]").first.input_value()
+    assert shown.startswith("#ff")
     red, green, blue = (int(shown[k : k + 2], 16) for k in (1, 3, 5))
     np.testing.assert_allclose([green / red, blue / red], [140 / 220, 60 / 220], atol=0.06)
     page.get_by_role("button", name="Look like this").click()
