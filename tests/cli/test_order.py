@@ -106,6 +106,8 @@ def test_behind_two_dashes_everything_is_a_path() -> None:
         ("relight r.xml", "(see lightpaint relight --help)"),
         ("--spp 4 solve r.xml a.png", "the command comes first: lightpaint COMMAND --spp"),
         ("slove r.xml", "invalid choice: 'slove'"),
+        ("slove r.xml", "'doctor'); did you mean 'solve'?"),
+        ("solve r.xml p.exr --colors gentel", "did you mean 'gentle'?"),
     ],
 )
 def test_slips_name_the_help_of_their_command(tmp_path: Path, line: str, message: str) -> None:

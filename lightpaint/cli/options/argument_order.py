@@ -25,6 +25,15 @@ class Parser(argparse.ArgumentParser):
         lines.err(f"{self.prog}: {message} (see {self.prog} --help)")
         self.exit(2)
 
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            names = [str(x) for x in action.choices or ()]
+            for similar in difflib.get_close_matches(str(value), names, n=1):
+                error.message += f"; did you mean {similar!r}?"
+            raise
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse arguments as argparse does; explain where an option before the command belongs."""
         first = args[0] if args else ""
