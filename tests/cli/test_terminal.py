@@ -157,6 +157,19 @@ def test_one_thing_is_no_plural(
     assert capfd.readouterr().err == f"basis: {line}\n"
 
 
+def test_an_interrupted_listener_shows_no_more_progress(capfd: pytest.CaptureFixture[str]) -> None:
+    """A thread that was in the middle of a step reports it after the command has said its last."""
+    listen = terminal.TerminalListener()
+    with pytest.raises(KeyboardInterrupt), listen:
+        raise KeyboardInterrupt
+    listen("basis", 0, 2)
+    assert capfd.readouterr().err == ""
+    with listen:
+        listen("basis", 0, 2)
+    listen("solving", 0, 2)
+    assert capfd.readouterr().err == "basis: 2 passes\nsolving: 2 passes\n"
+
+
 def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")

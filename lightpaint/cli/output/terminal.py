@@ -171,7 +171,8 @@ class TerminalListener:
     """A listener that shows progress and remarks on stderr, each remark once.
 
     On a terminal it shows bars while it is entered, and a line for each busy worker; in a log, a
-    line for each piece of work that begins, and now and then how far it is.
+    line for each piece of work that begins, and now and then how far it is. Once it is left by an
+    error or an interrupt, it shows no progress: threads may still end their last steps.
     """
 
     def __init__(self) -> None:
@@ -181,9 +182,10 @@ class TerminalListener:
         self._workers: dict[str, TaskID] = {}
         self._workers_without_line: set[str] = set()  # workers without a line
         self._works: dict[str, _Work] = {}  # by label
+        self._is_over = False
 
     def __enter__(self) -> "TerminalListener":
-        mode = output_mode()
+        mode, self._is_over = output_mode(), False
         if sys.stderr.isatty() and not (mode.is_quiet or mode.json_progress):
             columns = (
                 TextColumn("{task.description}", markup=False),
@@ -196,13 +198,16 @@ class TerminalListener:
             self._bars.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
+        self._is_over = kind is not None
         if self._bars is not None:
             self._bars.stop()
         self._bars, self._tasks, self._workers, self._workers_without_line = None, {}, {}, set()
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
+        if self._is_over:
+            return
         work = self._works.get(label)
         if work is None or done < work.done or total != work.total:  # it begins, or begins again
             line_s = None if work is None or done == 0 else work.line_s

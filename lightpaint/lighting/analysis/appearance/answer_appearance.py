@@ -39,7 +39,6 @@ from lightpaint.lighting.analysis.appearance.display_difference import (
     object_with_most_error,
     place_with_most_error,
     undetermined_at,
-    untold_at,
 )
 from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     HEADLINE_SHARE,
@@ -377,8 +376,7 @@ def with_undetermined(
     """Return the appearance of a view with the lights that its samples do not determine."""
     if (place := appearance.place) is None:
         return appearance
-    there = undetermined_at(view, place, uncertainty)
-    untold = untold_at(view, place, uncertainty)
+    there, untold = undetermined_at(view, place, uncertainty)
     return replace(
         appearance,
         # What its error may bring to the place, a light can bring there.

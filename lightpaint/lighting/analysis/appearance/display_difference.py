@@ -332,29 +332,25 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     return tuple(names), bool(share.max() > DOES_MUCH)
 
 
-def undetermined_at(solution: Solution, place: Place, uncertainty: Uncertainty) -> tuple[str, ...]:
-    """Return the lights whose error alone may be all that is missing at a place, or too much there.
+def undetermined_at(
+    solution: Solution, place: Place, uncertainty: Uncertainty
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the lights whose error alone may be all that is missing at a place, or too much there;
+    and of those that the samples do not determine, the lights whose error may be a third of it, in
+    the channel that lacks most. The others hardly reach it, however bright they are.
 
     A light of known weight takes no part, whatever the samples say of the others.
     """
     missing, possible = _light_of_errors(solution, place, uncertainty)
     lacking = abs(float(luminance(missing)))
-    names = solution.basis.names
-    return tuple(
-        name for name, x in zip(names, luminance(possible), strict=True) if x >= lacking > 0
-    )
-
-
-def untold_at(solution: Solution, place: Place, uncertainty: Uncertainty) -> tuple[str, ...]:
-    """Return the lights that the samples do not determine and whose error may be a third of what is
-    missing at a place, in the channel that lacks most.
-
-    The others hardly reach it, however bright they are.
-    """
-    missing, possible = _light_of_errors(solution, place, uncertainty)
+    is_all = luminance(possible) >= lacking if lacking > 0 else np.zeros(len(possible), bool)
     channel = int(np.argmax(np.abs(missing)))
     is_enough = possible[:, channel] >= UNTOLD_SHARE * abs(missing[channel])
-    return tuple(solution.basis.names[k] for k in np.flatnonzero(uncertainty.untold & is_enough))
+    alone, untold = (
+        tuple(solution.basis.names[k] for k in np.flatnonzero(x))
+        for x in (is_all, uncertainty.untold & is_enough)
+    )
+    return alone, untold
 
 
 def _light_of_errors(
