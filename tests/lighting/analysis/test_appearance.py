@@ -12,6 +12,7 @@ from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.answer_analysis import analyse
+from lightpaint.lighting.analysis.appearance import display_difference
 from lightpaint.lighting.analysis.appearance.answer_appearance import (
     CLOSE,
     Appearance,
@@ -185,6 +186,21 @@ def test_an_undetermined_light_that_hardly_reaches_the_place_is_not_the_reason(
         untold=np.array([True, True]),
     )
     assert with_undetermined(appearance, solution, uncertain).hidden_lights == hidden
+
+
+def test_paths_of_many_lights_are_found_in_one_walk(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    noise = np.random.default_rng(3).normal(0, 0.01, (5, *SIZE, 3))
+    basis = make_basis(n=5, size=SIZE, half_differences=noise)
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), 0.5)
+    solution, lights = solve(basis, target), np.array([1, 3, 4])
+    one_by_one = display_difference._light_of_paths(solution, lights)
+    monkeypatch.setattr(display_difference, "MAX_SINGLE_PLANES", 2)
+    found = display_difference._light_of_paths(solution, lights)
+    assert found.min() > 0
+    # Sums in another order.
+    np.testing.assert_allclose(found, one_by_one, rtol=1e-12)
 
 
 def test_only_planes_of_undetermined_lights_are_asked_for_their_paths(

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, as_rgb
-from lightpaint.basis import Basis, Planes, light_images, thinned
+from lightpaint.basis import Basis, Planes, blocks_of, light_images, thinned
 from lightpaint.colour import LUMINANCE, ViewTransform, ciede2000, lab, luminance
 from lightpaint.images import Objects, block_sums, enlarged
 from lightpaint.lighting.analysis.diagnosis import REGIONS, Place, WorstRegion
@@ -55,6 +55,9 @@ UNTOLD_SHARE = 1 / 3
 
 #: Maximum number of values, pixels times lights, that suffice to find the light of one path.
 PATH_SAMPLE = 2**22
+
+#: Most lights whose planes are read one by one for it: a plane takes as long as some rows of all.
+MAX_SINGLE_PLANES = 2**5
 
 #: Smallest unpainted share of the picture for a place to be mentioned.
 MIN_PLACE = 0.01
@@ -390,13 +393,19 @@ def _light_of_paths(solution: Solution, lights: Indices) -> Doubles:
     """
     basis, painted = solution.basis, np.flatnonzero(solution.importance)
     step = -(-len(painted) * len(basis.names) // PATH_SAMPLE)
-    total, variance = np.empty((2, len(lights), 3))
-    for row, k in enumerate(lights):
-        light, noise = (
-            x.plane(int(k)).reshape(-1, 3)[painted[::step]].astype(np.float64)
-            for x in (basis.planes, basis.noise)
-        )
-        total[row], variance[row] = np.einsum("pc->c", light), np.einsum("pc,pc->c", noise, noise)
+    total, variance = np.zeros((2, len(lights), 3))
+    if len(lights) > MAX_SINGLE_PLANES:
+        for block in blocks_of(basis.planes, painted[::step]):
+            light, noise = (x.pixels(block)[lights] for x in (basis.planes, basis.noise))
+            total += light.sum(axis=1, dtype=np.float64)
+            variance += np.square(noise, dtype=np.float64).sum(axis=1)
+    else:
+        for row, k in enumerate(lights.tolist()):
+            light, noise = (
+                x.plane(k).reshape(-1, 3)[painted[::step]].astype(np.float64)
+                for x in (basis.planes, basis.noise)
+            )
+            total[row], variance[row] = light.sum(axis=0), np.square(noise).sum(axis=0)
     return np.asarray(np.divide(variance, total, out=np.zeros_like(total), where=total > 0))
 
 
