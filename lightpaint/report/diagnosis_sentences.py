@@ -471,12 +471,29 @@ def spoken_deliveries(deliveries: Sequence[Delivery], told: str = "") -> str:
         return " ".join([text, *(f"{spoken_delivery(entry)}." for entry in overdone)])
     by_share = sorted(entries, key=lambda entry: entry.least or 0.0)
     shown = [entry for entry in entries if entry in by_share[:MAX_WISHES]]
-    spoken = [spoken_delivery(entry) for entry in shown]
-    texts = [f"{text}." for text in spoken if f". {text}" not in f". {told}"]
+    spoken = [_untold_delivery(entry, told) for entry in shown]
+    texts = [f"{text}." for text in spoken if text]
     rest = len(entries) - len(shown)
     if rest > 0:
         texts.append(f"More came of {'one other' if rest == 1 else f'{rest} others'}.")
     return " ".join(texts)
+
+
+def _untold_delivery(delivery: Delivery, told: str) -> str:
+    """Return `Moonlight: brightness 98 %, colour 43 %`, or the part that is not in the sentences
+    before it; "" if they have all of it.
+    """
+    before, text = f". {told}", spoken_delivery(delivery)
+    if f". {text}" in before:
+        return ""
+    if f". {spoken_unreached(delivery)}" not in before:
+        return text
+    if delivery.lacks_brightness == delivery.lacks_color:
+        return ""
+    part, share = (
+        ("brightness", delivery.brightness) if delivery.lacks_color else ("colour", delivery.color)
+    )
+    return "" if share is None else f"{wish_name(delivery)}: {part} {spoken_share(share)}"
 
 
 def spoken_mean_shares(deliveries: Sequence[Delivery]) -> str:

@@ -228,6 +228,15 @@ def test_wishes_are_listed():
     assert spoken_deliveries([MOON, LANTERN], told="Close. Lantern: 8 %, since it is off.") == (
         "Moonlight: brightness 98 %, colour 43 %."
     )
+    # What a sentence before says of the worst wish is not said again.
+    told = "Close. Lantern: out of reach (8 % came), since sun would light too much else."
+    assert spoken_deliveries([MOON, LANTERN], told=told) == (
+        "Moonlight: brightness 98 %, colour 43 %."
+    )
+    told = "Close. Moonlight: out of reach in colour (43 % came), since sky lights the floor, too."
+    assert spoken_deliveries([MOON, LANTERN], told=told) == (
+        "Moonlight: brightness 98 %. Lantern: 8 %."
+    )
     parts = [replace(RIM, name=name, kind="wish", layers=()) for name in ("Vase", "Top left")]
     assert spoken_deliveries(parts) == "Of each of 2 wishes at least 95 % came."
     assert spoken_deliveries([replace(parts[0], brightness=0.5), parts[1]]) == (
