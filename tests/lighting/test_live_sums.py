@@ -92,7 +92,7 @@ def test_the_film_reads_the_paint_as_exact_answers_do(
 def test_wishes_that_stay_as_they_are_are_summed_and_divided_once(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ):
-    """What is kept of the last reading equals what a new film reads, also for replaced planes."""
+    """Kept sums and places equal those of a new film, after a stroke and after a light moves."""
     basis = make_basis(5, SIZE)
     image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     areas = [np.zeros(SIZE, np.float32) for _ in range(6)]

@@ -189,6 +189,16 @@ def test_alike_are_lights_of_one_shape(make_basis: Any):
     assert not Wash.of(_basis(make_basis), _paint(_basis(make_basis))).alike.size
 
 
+def test_lamps_that_are_alike_leave_the_kept_sums_of_wishes(make_basis: Any):
+    basis, target = _bar(make_basis)
+    wash = Wash.of(basis, target)
+    shares = np.random.default_rng(0).random((3, wash.counts.size))
+    first = wash.light_sums(shares)
+    ExpectedLights.of(wash, basis.current_weights)
+    kept = wash.kept_sums.of(shares, lambda _: pytest.fail("wishes are summed again"))
+    np.testing.assert_array_equal(kept.transpose(1, 2, 0), first)
+
+
 def test_mixes_of_own_colours_are_the_nearest():
     """As SciPy finds them; the iteration is slow where two of the colours are nearly one."""
     rng = np.random.default_rng(0)

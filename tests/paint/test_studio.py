@@ -579,7 +579,7 @@ def test_a_preview_shows_what_the_change_does_then(
 
 @pytest.mark.nightly
 def test_letting_go_gradually_is_judged_on_the_whole_picture(client: StudioClient):
-    """What the button sets brings what it says, and changes the rest less than no hold does.
+    """The offered hold gives the ΔE that it promises, and changes the rest less than no hold does.
 
     From a hold above the usual one, as a weaker one here changes the rest more than it gains.
     """

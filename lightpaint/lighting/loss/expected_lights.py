@@ -244,6 +244,11 @@ class Wash:
         sums = self.kept_sums.of(weights, lambda x: self._light_sums(x).transpose(2, 0, 1))
         return np.asarray(sums.transpose(1, 2, 0))
 
+    def light_in_picture(self) -> Doubles:
+        """Return the sum of each light over all pixels that count, (n, 3)."""
+        # Not kept: it would take the place of the sums of the wishes.
+        return np.asarray(self._light_sums(self.counts[None])[..., 0].T)
+
     def _light_sums(self, weights: Doubles) -> Doubles:
         """Return the same as `light_sums`, without results that are kept."""
         columns = np.swapaxes(weights, -1, -2)
@@ -542,8 +547,9 @@ class ExpectedLights:
         change = moved / np.where(sums > 0, sums, 1)
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         pairs = wash.alike if is_free is None else wash.alike[is_free[wash.alike].all(axis=1)]
-        light = wash.light_sums(wash.counts[None])[..., 0].T if len(pairs) else sums
-        needed, brings = _needed_colors(light * current, change, pairs)
+        needed, brings = np.ones((2, len(current)))
+        if len(pairs):
+            needed, brings = _needed_colors(wash.light_in_picture() * current, change, pairs)
         excess = (amount * needed / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(brings * excess / (1 + excess), np.float64)
         emission, painted = (
@@ -571,8 +577,6 @@ def _needed_colors(light: Doubles, change: Doubles, pairs: Indices) -> tuple[Dou
     see `alike_lights`.
     """
     needed, brings = np.ones((2, len(light)))
-    if not len(pairs):
-        return needed, brings
     lights, first, count = np.unique(pairs[:, 0], return_index=True, return_counts=True)
     # The members of each group, of which the first is the light itself; the last row is dark.
     members = np.full((len(lights), count.max() + 1), len(light))
